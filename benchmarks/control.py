@@ -17,7 +17,14 @@ import numpy as np
 from benchmarks.command import publish, tell
 from benchmarks.peers.aba_loop import AbaLoop, default_swing
 from benchmarks.peers.fdyn import Fdyn, own_puma_accelerations
-from benchmarks.simulation_report import BatchRow, IntegrationRow, ModelCheck, SimulationReport, SingleRow, Timing
+from benchmarks.simulation_report import (
+    BatchRow,
+    IntegrationRow,
+    ModelCheck,
+    SimulationReport,
+    SingleRow,
+    Timing,
+)
 from dhkit.arm import Arm
 from dhkit.bench.benchmark_report import Missing, Requirement
 from dhkit.bench.contenders import Call, UnavailableError
@@ -92,7 +99,11 @@ class _Measurements:
 
 
 def compare_simulations(
-    arm: Arm, sizes: SimulationSizes | None = None, *, seed: int = 0, progress: Progress | None = None
+    arm: Arm,
+    sizes: SimulationSizes | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
 ) -> SimulationReport:
     """Time simulation beside peers, in one process, contenders in turns.
 
@@ -189,7 +200,9 @@ def _single(arm: Arm, sizes: SimulationSizes) -> SingleRow:
         steps=len(result.t) - 1,
         timing=timing,
         joint_error=float(result.peak_error.max()),
-        integration_error=max(_difference(_states(result), _states(run(plant_rate=FINE_STEPS * RATE)))),
+        integration_error=max(
+            _difference(_states(result), _states(run(plant_rate=FINE_STEPS * RATE)))
+        ),
         audit=result.audit.error,
     )
 
@@ -202,13 +215,23 @@ def _many(arm: Arm, sizes: SimulationSizes, seed: int, measurements: _Measuremen
 
     def batch(keep: str, threads: int) -> Call:
         return partial(
-            arm.simulate_batch, controller, target, sizes.batch, start, rate=RATE, keep=keep, threads=threads
+            arm.simulate_batch,
+            controller,
+            target,
+            sizes.batch,
+            start,
+            rate=RATE,
+            keep=keep,
+            threads=threads,
         )
 
     result = arm.simulate_batch(controller, target, sizes.batch, start, rate=RATE, keep="final")
     steps = len(result.t) - 1
     calls: dict[str, tuple[Call, int]] = {
-        f'dhkit, keep="{keep}", {threads} thread{"s"[: threads - 1]}': (batch(keep, threads), sizes.arms)
+        f'dhkit, keep="{keep}", {threads} thread{"s"[: threads - 1]}': (
+            batch(keep, threads),
+            sizes.arms,
+        )
         for keep in ("final", "errors")
         for threads in (1, 2)
     }
@@ -246,9 +269,15 @@ def _check_models(arm: Arm, measurements: _Measurements) -> None:
         measurements.models.append(ModelCheck(model, difference))
 
     try:
-        compare("roboticstoolbox, DHRobot of dhkit's table", Fdyn(arm.description).accelerations(q, qd, tau))
+        compare(
+            "roboticstoolbox, DHRobot of dhkit's table",
+            Fdyn(arm.description).accelerations(q, qd, tau),
+        )
         if arm.name == "puma560":
-            compare("roboticstoolbox, its own Puma560 without friction", own_puma_accelerations(q, qd, tau))
+            compare(
+                "roboticstoolbox, its own Puma560 without friction",
+                own_puma_accelerations(q, qd, tau),
+            )
     except UnavailableError as error:
         measurements.missing.append(Missing("models", "roboticstoolbox", str(error)))
 
@@ -272,7 +301,10 @@ def _swing(arm: Arm, sizes: SimulationSizes, seed: int, measurements: _Measureme
     contenders |= _continuous(run)
     problem = f"Passive swing, {sizes.swing:g} s"
     for name, peer in (
-        ("solve_ivp over pin.aba, RK45, its defaults", lambda: partial(default_swing, arm.description)),
+        (
+            "solve_ivp over pin.aba, RK45, its defaults",
+            lambda: partial(default_swing, arm.description),
+        ),
         ("roboticstoolbox fdyn, RK45, its defaults", lambda: Fdyn(arm.description).swing),
         (
             f"roboticstoolbox fdyn, RK45, rtol {TIGHT_OPTIONS['rtol']:g}",
@@ -284,7 +316,9 @@ def _swing(arm: Arm, sizes: SimulationSizes, seed: int, measurements: _Measureme
         except UnavailableError as error:
             measurements.missing.append(Missing(problem, name, str(error)))
     exact = _states(run(rate=None, plant_rate=SPARSE_RATE, tolerance=EXACT_TOLERANCE))
-    measurements.integration += _integrations(problem, contenders, exact, sizes.swing, sizes.repeats, drift)
+    measurements.integration += _integrations(
+        problem, contenders, exact, sizes.swing, sizes.repeats, drift
+    )
 
 
 def _controlled(arm: Arm, sizes: SimulationSizes, measurements: _Measurements) -> None:
@@ -292,7 +326,16 @@ def _controlled(arm: Arm, sizes: SimulationSizes, measurements: _Measurements) -
     wave, controller = _wave(arm), ComputedTorque.tuned(arm)
     q0, qd0 = (rows[0] for rows in wave.sampled(np.zeros(1))[:2])
     q0 = q0 + OFFSET
-    run = partial(arm.simulate, controller, wave, sizes.controlled, q0=q0, qd0=qd0, restitution=None, saturation=False)
+    run = partial(
+        arm.simulate,
+        controller,
+        wave,
+        sizes.controlled,
+        q0=q0,
+        qd0=qd0,
+        restitution=None,
+        saturation=False,
+    )
     contenders = dict(_continuous(run))
     contenders["dhkit, RK4 at 1 kHz, torques held"] = lambda: _states(run(rate=RATE))
     problem = f"Computed torque in continuous time, {sizes.controlled:g} s"
@@ -304,14 +347,18 @@ def _controlled(arm: Arm, sizes: SimulationSizes, measurements: _Measurements) -
         except UnavailableError as error:
             measurements.missing.append(Missing(problem, full, str(error)))
     exact = _states(run(rate=None, plant_rate=SPARSE_RATE, tolerance=EXACT_TOLERANCE))
-    measurements.integration += _integrations(problem, contenders, exact, sizes.controlled, sizes.repeats)
+    measurements.integration += _integrations(
+        problem, contenders, exact, sizes.controlled, sizes.repeats
+    )
 
 
 def _continuous(run: Callable[..., SimulationResult]) -> Mapping[str, Callable[[], States]]:
     """Return runs by DOP853, by name: with as many rows as by default, and with few."""
     return {
         "dhkit, DOP853, 1000 rows a second": lambda: _states(run(rate=None)),
-        f"dhkit, DOP853, {SPARSE_RATE:g} rows a second": lambda: _states(run(rate=None, plant_rate=SPARSE_RATE)),
+        f"dhkit, DOP853, {SPARSE_RATE:g} rows a second": lambda: _states(
+            run(rate=None, plant_rate=SPARSE_RATE)
+        ),
     }
 
 
@@ -339,16 +386,28 @@ def _integrations(
         )
 
 
-def _requirements(robot: str, sizes: SimulationSizes, measurements: _Measurements) -> Iterator[Requirement]:
+def _requirements(
+    robot: str, sizes: SimulationSizes, measurements: _Measurements
+) -> Iterator[Requirement]:
     """Yield the requirements of simulation, beside the measured numbers."""
     full = SimulationSizes()
     conditions = f"puma560, {full.single:g} s, and {full.arms} arms for {full.batch:g} s"
-    is_judged = robot == "puma560" and (sizes.single, sizes.arms, sizes.batch) == (full.single, full.arms, full.batch)
+    is_judged = robot == "puma560" and (sizes.single, sizes.arms, sizes.batch) == (
+        full.single,
+        full.arms,
+        full.batch,
+    )
     loop = next((row for row in measurements.batch if row.difference is not None), None)
     wall = measurements.single[0].timing.seconds if measurements.single else None
     lines = (
         ("one arm", "s for 10 s under computed torque, RK4 at 1 kHz", MAX_SECONDS, True, wall),
-        ("many arms", "times a loop over pin.aba, one thread", MIN_RATIO, False, loop.ratio if loop else None),
+        (
+            "many arms",
+            "times a loop over pin.aba, one thread",
+            MIN_RATIO,
+            False,
+            loop.ratio if loop else None,
+        ),
         (
             "many arms",
             "difference from that loop's last states",
@@ -358,7 +417,9 @@ def _requirements(robot: str, sizes: SimulationSizes, measurements: _Measurement
         ),
     )
     for quantity, what, required, at_most, measured in lines:
-        yield Requirement(quantity, what, required, at_most, measured, is_judged, conditions=conditions)
+        yield Requirement(
+            quantity, what, required, at_most, measured, is_judged, conditions=conditions
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -366,11 +427,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     full = SimulationSizes()
     parser = argparse.ArgumentParser(description="Simulation beside peers.")
     parser.add_argument("--robot", default="puma560", help="of the library (default: puma560)")
-    parser.add_argument("--single", type=float, default=full.single, help="s of one arm (default: %(default)s)")
-    parser.add_argument("--arms", type=int, default=full.arms, help="of the batch (default: %(default)s)")
-    parser.add_argument("--repeats", type=int, default=full.repeats, help="rounds (default: %(default)s)")
+    parser.add_argument(
+        "--single", type=float, default=full.single, help="s of one arm (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--arms", type=int, default=full.arms, help="of the batch (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--repeats", type=int, default=full.repeats, help="rounds (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
+    parser.add_argument(
+        "--output", type=Path, default=RESULT, help="path of the results, without ending"
+    )
     chosen = parser.parse_args(arguments)
     report = compare_simulations(
         Arm.load(chosen.robot),

@@ -11,7 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.control import CONTROLLERS, ComputedTorque, FrictionCompensation, Plant, SimulationResult, compare
+from dhkit.control import (
+    CONTROLLERS,
+    ComputedTorque,
+    FrictionCompensation,
+    Plant,
+    SimulationResult,
+    compare,
+)
 from dhkit.description import write_atomically
 from dhkit.dynamics import Friction
 from dhkit.errors import SimulationError
@@ -169,7 +176,9 @@ def with_tables(text: str, progress: Progress | None = None) -> str:
 def table(errors: Mapping[str, Errors]) -> str:
     """Return errors, by the names of controllers, as a Markdown table of numbers with two significant digits."""
     rows = [["controller", *HEADINGS.values()], ["---"] * (len(HEADINGS) + 1)]
-    rows += [[name, *(_text(getattr(row, field)) for field in HEADINGS)] for name, row in errors.items()]
+    rows += [
+        [name, *(_text(getattr(row, field)) for field in HEADINGS)] for name, row in errors.items()
+    ]
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
@@ -179,7 +188,9 @@ def _text(value: float | None) -> str:
 
 def main() -> None:
     """Simulate, and write the tables."""
-    text = with_tables(PAGE.read_text("utf-8"), lambda line: print(line, file=sys.stderr, flush=True))
+    text = with_tables(
+        PAGE.read_text("utf-8"), lambda line: print(line, file=sys.stderr, flush=True)
+    )
     write_atomically(PAGE, text)
     print(f"wrote {PAGE}", file=sys.stderr)
 

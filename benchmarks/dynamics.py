@@ -5,4 +5,7 @@ from pathlib import Path
 from benchmarks.targets import main
 
 if __name__ == "__main__":
-    main(("inverse_dynamics", "mass_matrix", "forward_dynamics"), Path(__file__).parent / "results" / "dynamics")
+    main(
+        ("inverse_dynamics", "mass_matrix", "forward_dynamics"),
+        Path(__file__).parent / "results" / "dynamics",
+    )

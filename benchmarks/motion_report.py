@@ -38,7 +38,15 @@ class MotionRow:
         Median time to find a motion, and the time within which 95 % are found, s.
     """
 
-    COLUMNS: ClassVar[tuple[str, ...]] = ("motion", "found", "over fine, mean", "max", "excess", "time, median", "95 %")
+    COLUMNS: ClassVar[tuple[str, ...]] = (
+        "motion",
+        "found",
+        "over fine, mean",
+        "max",
+        "excess",
+        "time, median",
+        "95 %",
+    )
     speed: float
     contender: str
     pairs: int
@@ -98,7 +106,9 @@ class MotionReport(Report):
         return MEANING
 
     def __repr__(self) -> str:
-        return repr_line("MotionReport", self.robot, f"{self.pairs} random pairs, {len(self.rows)} rows")
+        return repr_line(
+            "MotionReport", self.robot, f"{self.pairs} random pairs, {len(self.rows)} rows"
+        )
 
     @property
     def main_table(self) -> str:

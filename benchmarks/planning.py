@@ -138,17 +138,25 @@ def compare_motions(
                 tell(f"building {count} intervals")
                 planners[count], seconds = _build_planner(description, count)
                 builds.append(MeshBuild(count, seconds))
-            movers = _movers(description, {count: planners[count] for count in counts}, usual, missing)
+            movers = _movers(
+                description, {count: planners[count] for count in counts}, usual, missing
+            )
             for speed in speeds:
                 limits = Limits.of(description).scaled(velocity=speed)
                 for k, (start, goal) in enumerate(holdable_pairs(description, pairs, seed)):
                     tell(f"speeds x {speed:g}: pair {k + 1} of {pairs}")
                     gc.collect()
-                    samples += _pair(movers, planners[FINE_FACTOR * usual], start, goal, limits, speed, k)
+                    samples += _pair(
+                        movers, planners[FINE_FACTOR * usual], start, goal, limits, speed, k
+                    )
         except KeyboardInterrupt:
             interrupted = True
-    rows = tuple(row for speed in speeds for row in _rows([s for s in samples if s.speed == speed], usual))
-    return MotionReport(description.name, pairs, seed, rows, tuple(builds), tuple(missing), machine, interrupted)
+    rows = tuple(
+        row for speed in speeds for row in _rows([s for s in samples if s.speed == speed], usual)
+    )
+    return MotionReport(
+        description.name, pairs, seed, rows, tuple(builds), tuple(missing), machine, interrupted
+    )
 
 
 def holdable_pairs(description: Description, count: int, seed: int) -> Array:
@@ -205,9 +213,13 @@ def _movers(
         movers["toppra, straight joint path"] = timing
     except (UnavailableError, PlanningError) as error:
         missing.append(Missing("motions", "toppra", str(error)))
-    movers["best trapezoid"] = lambda start, goal, limits: trapezoidal(description, start, goal, limits=limits)
+    movers["best trapezoid"] = lambda start, goal, limits: trapezoidal(
+        description, start, goal, limits=limits
+    )
     movers["quintic"] = lambda start, goal, limits: quintic(description, start, goal, limits=limits)
-    return movers | {_name(count, usual): mover_of(p) for count, p in planners.items() if count != usual}
+    return movers | {
+        _name(count, usual): mover_of(p) for count, p in planners.items() if count != usual
+    }
 
 
 def _name(intervals: int, usual: int) -> str:
@@ -216,7 +228,13 @@ def _name(intervals: int, usual: int) -> str:
 
 
 def _pair(
-    movers: dict[str, Mover], fine: Planner, start: Array, goal: Array, limits: Limits, speed: float, k: int
+    movers: dict[str, Mover],
+    fine: Planner,
+    start: Array,
+    goal: Array,
+    limits: Limits,
+    speed: float,
+    k: int,
 ) -> Iterator[_Sample]:
     """Yield each contender's motion; the one on the fine mesh is the last, since it starts from the usual one."""
     warm: Trajectory | None = None
@@ -224,7 +242,10 @@ def _pair(
     def finest(start: Array, goal: Array, limits: Limits) -> Motion:
         return fine.solve(start, goal, limits=limits, warm=warm, time_limit=MAX_FINE_TIME)
 
-    for name, mover in [*movers.items(), (_name(fine.intervals, fine.intervals // FINE_FACTOR), finest)]:
+    for name, mover in [
+        *movers.items(),
+        (_name(fine.intervals, fine.intervals // FINE_FACTOR), finest),
+    ]:
         begin = perf_counter()
         try:
             motion = mover(start, goal, limits)
@@ -234,7 +255,9 @@ def _pair(
         seconds = perf_counter() - begin
         if warm is None and isinstance(motion, Trajectory):
             warm = motion
-        yield _Sample(speed, name, k, motion.duration, _excess(fine.description, motion, limits), seconds)
+        yield _Sample(
+            speed, name, k, motion.duration, _excess(fine.description, motion, limits), seconds
+        )
 
 
 def _excess(description: Description, motion: Motion, limits: Limits) -> float:
@@ -250,7 +273,9 @@ def _rows(samples: list[_Sample], usual: int) -> Iterator[MotionRow]:
     """Yield a row for each contender, of samples at one speed."""
     best = {s.pair: s.duration for s in samples if s.contender == _name(FINE_FACTOR * usual, usual)}
     for name in dict.fromkeys(s.contender for s in samples):
-        compared = [s for s in samples if s.contender == name and np.isfinite(best.get(s.pair, np.inf))]
+        compared = [
+            s for s in samples if s.contender == name and np.isfinite(best.get(s.pair, np.inf))
+        ]
         found = [s for s in compared if np.isfinite(s.duration)]
         if not found:
             continue
@@ -273,9 +298,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark, write its report and print it."""
     parser = argparse.ArgumentParser(description="Motions in least time beside others.")
     parser.add_argument("--robot", default="puma560", help="of the library (default: puma560)")
-    parser.add_argument("--pairs", type=int, default=30, help="random starts and goals (default: 30)")
+    parser.add_argument(
+        "--pairs", type=int, default=30, help="random starts and goals (default: 30)"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
+    parser.add_argument(
+        "--output", type=Path, default=RESULT, help="path of the results, without ending"
+    )
     chosen = parser.parse_args(arguments)
     report = compare_motions(
         library_robot(chosen.robot),

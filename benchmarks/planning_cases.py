@@ -69,7 +69,15 @@ class CaseRow:
         Whether it was seen.
     """
 
-    COLUMNS: ClassVar[tuple[str, ...]] = ("case", "found", "time, median", "95 %", "max", "wanted", "met")
+    COLUMNS: ClassVar[tuple[str, ...]] = (
+        "case",
+        "found",
+        "time, median",
+        "95 %",
+        "max",
+        "wanted",
+        "met",
+    )
     case: str
     motions: int
     found: int
@@ -84,7 +92,13 @@ class CaseRow:
         """The cells of a row under :attr:`COLUMNS`."""
         times = (self.median, self.late, self.longest)
         found = f"{self.found} of {self.motions}"
-        return [self.case, found, *(duration(time) for time in times), self.wanted, "yes" if self.met else "no"]
+        return [
+            self.case,
+            found,
+            *(duration(time) for time in times),
+            self.wanted,
+            "yes" if self.met else "no",
+        ]
 
 
 @dataclass(frozen=True)
@@ -120,7 +134,8 @@ class CaseReport(Report):
 
 
 MEANING = (
-    "Time: of one call that finds a motion, with its certificate by Pinocchio; first calls make their programs too."
+    "Time: of one call that finds a motion, with its certificate by Pinocchio; "
+    "first calls make their programs too."
 )
 
 
@@ -175,19 +190,43 @@ def _measured(case: str, wanted: str, most: float, motions: Iterator[Case]) -> C
             print(f"{case}: {error}", file=sys.stderr)
         seconds.append(perf_counter() - begin)
     middle, late, longest = (float(value) for value in np.quantile(seconds, [0.5, 0.95, 1.0]))
-    return CaseRow(case, len(seconds), found, middle, late, longest, wanted, found == len(seconds) and late <= most)
+    return CaseRow(
+        case,
+        len(seconds),
+        found,
+        middle,
+        late,
+        longest,
+        wanted,
+        found == len(seconds) and late <= most,
+    )
 
 
 def _cases(pairs: int, seed: int) -> Iterator[tuple[str, str, float, Iterator[Case]]]:
     """Yield names, what is wanted, the longest time for 95 %, s, and motions."""
     for count in (0, 1, 3, 5, 10):
-        yield f"ur5, first motion with {count} obstacles far away", "1.3 times that with none", np.inf, _first(count)
+        yield (
+            f"ur5, first motion with {count} obstacles far away",
+            "1.3 times that with none",
+            np.inf,
+            _first(count),
+        )
     yield "panda, first motion", "program 0.7 s", 0.7 + 0.5, _first_of_panda(seed)
     yield "box, table and payload, ur5, first", "3 s", 3.0, _beside_table(is_first=True)
     yield "box, table and payload, ur5, again", "1.5 s", 1.5, _beside_table(is_first=False)
     for objective in OBJECTIVES[1:]:
-        yield f"planar2r, {objective} at 1.03 times the least time", "none fails", np.inf, _near_least(objective)
-    yield "manutec_r3, energy at 0.53 s, 24 to 81 intervals", "within 0.1 % of the published", np.inf, _manutec()
+        yield (
+            f"planar2r, {objective} at 1.03 times the least time",
+            "none fails",
+            np.inf,
+            _near_least(objective),
+        )
+    yield (
+        "manutec_r3, energy at 0.53 s, 24 to 81 intervals",
+        "within 0.1 % of the published",
+        np.inf,
+        _manutec(),
+    )
     yield "planar2r, moves of 1e-9 to 1e-2 rad", "0.2 s", 0.2, _small_moves()
     yield "panda, three times its speeds", "0.5 s", 0.5, _fast_panda(seed)
     yield "panda, goal a pose, first motion", "1 s", 1.0, _pose_goals(seed)
@@ -196,12 +235,20 @@ def _cases(pairs: int, seed: int) -> Iterator[tuple[str, str, float, Iterator[Ca
         for objective in OBJECTIVES:
             for friction in (False, True):
                 case = f"{name}, {objective}{', friction' if friction else ''}"
-                yield case, "none fails", np.inf, _random_pairs(name, objective, friction, pairs, seed)
+                yield (
+                    case,
+                    "none fails",
+                    np.inf,
+                    _random_pairs(name, objective, friction, pairs, seed),
+                )
 
 
 def _first(count: int) -> Iterator[Case]:
     arm = library_robot("ur5")
-    start, goal = np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0]), np.array([1.6, -1.0, 1.2, -1.0, -1.0, 0.5])
+    start, goal = (
+        np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0]),
+        np.array([1.6, -1.0, 1.2, -1.0, -1.0, 0.5]),
+    )
     balls = [Obstacle.sphere(0.05, (3.0, 0.3 * k, 1.0)) for k in range(count)]
     for _ in range(20):
         yield lambda: Planner(arm).solve(start, goal, obstacles=balls)
@@ -292,13 +339,17 @@ def _new_processes() -> Iterator[Case]:
             environment = {**os.environ, "DHKIT_CACHE_DIR": folder}
             program = [sys.executable, "-c", FIRST_MOTION.format(last=1.0 - 0.05 * k)]
 
-            def find(program: list[str] = program, environment: dict[str, str] = environment) -> None:
+            def find(
+                program: list[str] = program, environment: dict[str, str] = environment
+            ) -> None:
                 subprocess.run(program, env=environment, check=True)
 
             yield find
 
 
-def _random_pairs(name: str, objective: str, friction: bool, pairs: int, seed: int) -> Iterator[Case]:
+def _random_pairs(
+    name: str, objective: str, friction: bool, pairs: int, seed: int
+) -> Iterator[Case]:
     arm = library_robot(name)
     planner = Planner(arm, objective, friction=friction)
     for start, goal in holdable_pairs(arm, pairs, seed):
@@ -308,10 +359,14 @@ def _random_pairs(name: str, objective: str, friction: bool, pairs: int, seed: i
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark, write its report and print it."""
     parser = argparse.ArgumentParser(description="Cases in which planners are slow or fail.")
-    parser.add_argument("--pairs", type=int, default=25, help="random pairs for each kind (default: 25)")
+    parser.add_argument(
+        "--pairs", type=int, default=25, help="random pairs for each kind (default: 25)"
+    )
     parser.add_argument("--only", default="", help="part of the names of the cases to measure")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
+    parser.add_argument(
+        "--output", type=Path, default=RESULT, help="path of the results, without ending"
+    )
     chosen = parser.parse_args(arguments)
     report = measure_cases(
         chosen.pairs,

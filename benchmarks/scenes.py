@@ -74,7 +74,9 @@ class SceneKind:
 KINDS = {
     "mixed": tuple(SceneKind(robot) for robot in ARMS),
     "spheres": tuple(SceneKind(robot, (10, 10), has_boxes=False) for robot in ("ur5", "panda")),
-    "itself": tuple(SceneKind(robot, (10, 10), has_boxes=False, self_collision=True) for robot in ARMS),
+    "itself": tuple(
+        SceneKind(robot, (10, 10), has_boxes=False, self_collision=True) for robot in ARMS
+    ),
 }
 """Kinds of scenes by name: 3 to 10 boxes and spheres, ten spheres, and ten spheres with self-collision."""
 
@@ -178,7 +180,10 @@ class SceneReport(Report):
 
     @property
     def _rows(self) -> list[list[str]]:
-        return [self._row(name) for name in (*dict.fromkeys(result.robot for result in self.results), "all")]
+        return [
+            self._row(name)
+            for name in (*dict.fromkeys(result.robot for result in self.results), "all")
+        ]
 
     def _row(self, robot: str) -> list[str]:
         chosen = [result for result in self.results if robot in (result.robot, "all")]
@@ -197,14 +202,23 @@ class SceneReport(Report):
     @property
     def tables(self) -> list[Table]:
         """Scenes by robot, and those without a motion."""
-        failed = [[result.robot, str(result.obstacles), result.reason] for result in self.results if result.reason]
+        failed = [
+            [result.robot, str(result.obstacles), result.reason]
+            for result in self.results
+            if result.reason
+        ]
         tables: list[Table] = [("Scenes", self.COLUMNS, self._rows)]
-        return tables + ([("Without a motion", ("robot", "obstacles", "why"), failed)] if failed else [])
+        return tables + (
+            [("Without a motion", ("robot", "obstacles", "why"), failed)] if failed else []
+        )
 
     @property
     def meaning(self) -> str:
         """What the columns mean."""
-        short, over = (max(getattr(result, name) for result in self.results) for name in ("shortfall", "excess"))
+        short, over = (
+            max(getattr(result, name) for result in self.results)
+            for name in ("shortfall", "excess")
+        )
         return (
             f"Motions in least time, {1000 * CLEARANCE:g} mm clear. Time: of one call, with the planner made before. "
             f"At {CHECK_RATE:g} Hz the motions come at most {max(short, 0.0):.0e} m nearer than that, by coal, and "
@@ -273,7 +287,11 @@ def compare_scenes(
             found = _scene(kinds[which], planners[which], next(sources[which]), given)
             if found is not None:
                 results.append(found)
-                ratio = "" if np.isinf(found.best) else f", {found.duration / found.best:.3f} of the best"
+                ratio = (
+                    ""
+                    if np.isinf(found.best)
+                    else f", {found.duration / found.best:.3f} of the best"
+                )
                 took = f"{found.seconds:.2f} s, {found.duration:.3f} s{ratio}"
                 tell(f"{len(results)}: {found.robot}, {took} {found.reason}")
     except KeyboardInterrupt:
@@ -307,7 +325,12 @@ def _scene(kind: SceneKind, planner: Planner, scene: Scene, starts: int) -> Scen
         if path is None:
             continue
         try:
-            best = min(best, planner.solve(scene.start, scene.goal, warm=_along(description, path), **options).duration)
+            best = min(
+                best,
+                planner.solve(
+                    scene.start, scene.goal, warm=_along(description, path), **options
+                ).duration,
+            )
         except PlanningError:
             continue
     if motion is None:
@@ -355,13 +378,23 @@ def _certified(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark, write its report and print it."""
-    parser = argparse.ArgumentParser(description="Motions among obstacles in scenes that OMPL solves.")
+    parser = argparse.ArgumentParser(
+        description="Motions among obstacles in scenes that OMPL solves."
+    )
     parser.add_argument("--scenes", type=int, default=200, help="number of scenes (default: 200)")
-    parser.add_argument("--compared", type=int, default=40, help="scenes compared with other starts (default: 40)")
-    parser.add_argument("--kind", choices=[*KINDS], default="mixed", help="kind of scenes (default: mixed)")
-    parser.add_argument("--starts", type=int, default=20, help="number of other starts (default: 20)")
+    parser.add_argument(
+        "--compared", type=int, default=40, help="scenes compared with other starts (default: 40)"
+    )
+    parser.add_argument(
+        "--kind", choices=[*KINDS], default="mixed", help="kind of scenes (default: mixed)"
+    )
+    parser.add_argument(
+        "--starts", type=int, default=20, help="number of other starts (default: 20)"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
+    parser.add_argument(
+        "--output", type=Path, default=RESULT, help="path of the results, without ending"
+    )
     chosen = parser.parse_args(arguments)
     report = compare_scenes(
         chosen.scenes,

@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dhkit.bench.benchmark_report import Missing, Report, Requirement, Table, duration, requirements_text
+from dhkit.bench.benchmark_report import (
+    Missing,
+    Report,
+    Requirement,
+    Table,
+    duration,
+    requirements_text,
+)
 from dhkit.bench.machine import Machine
 from dhkit.display import html_table, repr_line
 
@@ -74,7 +81,14 @@ class SingleRow:
 class BatchRow:
     """Many arms in one call, or one arm in a peer's loop."""
 
-    COLUMNS: ClassVar[tuple[str, ...]] = ("contender", "arms", "per arm and step", "quartiles", "ratio", "difference")
+    COLUMNS: ClassVar[tuple[str, ...]] = (
+        "contender",
+        "arms",
+        "per arm and step",
+        "quartiles",
+        "ratio",
+        "difference",
+    )
     contender: str
     arms: int
     each: Timing
@@ -169,7 +183,9 @@ class SimulationReport(Report):
 
     def __repr__(self) -> str:
         return repr_line(
-            "SimulationReport", self.robot, f"{self.repeats} rounds, {requirements_text(self.requirements)}"
+            "SimulationReport",
+            self.robot,
+            f"{self.repeats} rounds, {requirements_text(self.requirements)}",
         )
 
     @property
@@ -187,12 +203,24 @@ class SimulationReport(Report):
     def tables(self) -> list[Table]:
         """Requirements, one arm, many arms, errors beside times."""
         tables: list[Table] = [
-            ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),
+            (
+                "Required",
+                ("what", "required", "measured", ""),
+                [list(line.cells) for line in self.requirements],
+            ),
             ("One arm, called at 1 kHz", SingleRow.COLUMNS, [row.cells for row in self.single]),
-            ("Many arms, PD plus gravity at 1 kHz", BatchRow.COLUMNS, [row.cells for row in self.batch]),
+            (
+                "Many arms, PD plus gravity at 1 kHz",
+                BatchRow.COLUMNS,
+                [row.cells for row in self.batch],
+            ),
         ]
         tables += [
-            (problem, IntegrationRow.COLUMNS, [row.cells for row in self.integration if row.problem == problem])
+            (
+                problem,
+                IntegrationRow.COLUMNS,
+                [row.cells for row in self.integration if row.problem == problem],
+            )
             for problem in dict.fromkeys(row.problem for row in self.integration)
         ]
         tables += [

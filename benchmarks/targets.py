@@ -53,7 +53,12 @@ COMPARISONS = (
         at_most=True,
     ),
     _Comparison(
-        "ik", "times EAIK's batch call, all branches", eaik.BATCH, 12.0, lambda row: row.times_batch, target=20.0
+        "ik",
+        "times EAIK's batch call, all branches",
+        eaik.BATCH,
+        12.0,
+        lambda row: row.times_batch,
+        target=20.0,
     ),
     _Comparison(
         "ik",
@@ -78,7 +83,13 @@ COMPARISONS = (
         lambda row: row.times_batch,
         target=30.0,
     ),
-    _Comparison("mass_matrix", "times a loop over pin.crba", pinocchio.CRBA, 8.0, lambda row: row.times_batch),
+    _Comparison(
+        "mass_matrix",
+        "times a loop over pin.crba",
+        pinocchio.CRBA,
+        8.0,
+        lambda row: row.times_batch,
+    ),
     _Comparison(
         "forward_dynamics",
         "times pin.abaInParallel on one thread",
@@ -94,54 +105,99 @@ def targets(report: BenchReport) -> tuple[Requirement, ...]:
     is_judged = report.batch >= BATCH and report.threads == 1
     rows = {(row.quantity, row.contender): row for row in report.rows}
     return (
-        *(_compared(line, rows, is_judged) for line in COMPARISONS if line.quantity in report.quantities),
+        *(
+            _compared(line, rows, is_judged)
+            for line in COMPARISONS
+            if line.quantity in report.quantities
+        ),
         *(
             Requirement(
-                line.quantity, "scaling to two threads over a control loop's", 0.85, False, line.share, is_judged
+                line.quantity,
+                "scaling to two threads over a control loop's",
+                0.85,
+                False,
+                line.share,
+                is_judged,
             )
             for line in report.scaling
         ),
         *(
             Requirement(
-                line.quantity, f"peak memory over inputs and outputs ({line.called})", 3.0, True, line.share, is_judged
+                line.quantity,
+                f"peak memory over inputs and outputs ({line.called})",
+                3.0,
+                True,
+                line.share,
+                is_judged,
             )
             for line in report.memory
         ),
         *(
             Requirement(
-                line.quantity, "s from the start of a second process to its first batch", 2.0, True, line.second
+                line.quantity,
+                "s from the start of a second process to its first batch",
+                2.0,
+                True,
+                line.second,
             )
             for line in report.starts
         ),
         *(
-            Requirement(line.robot, f"s: {line.what}", MAX_DERIVATION_TIMES[line.what], True, line.seconds)
+            Requirement(
+                line.robot, f"s: {line.what}", MAX_DERIVATION_TIMES[line.what], True, line.seconds
+            )
             for line in report.derivations
             if line.what in MAX_DERIVATION_TIMES
         ),
         *(
-            Requirement("inverse_dynamics", "additions and multiplications", 400, True, line.total, target=305)
+            Requirement(
+                "inverse_dynamics",
+                "additions and multiplications",
+                400,
+                True,
+                line.total,
+                target=305,
+            )
             for line in report.operations
             if line.program == INVERSE_DYNAMICS
         ),
     )
 
 
-def _compared(line: _Comparison, rows: Mapping[tuple[str, str], Row], is_judged: bool) -> Requirement:
+def _compared(
+    line: _Comparison, rows: Mapping[tuple[str, str], Row], is_judged: bool
+) -> Requirement:
     row = rows.get((line.quantity, line.peer))
     measured = line.measured(row) if row else None
-    return Requirement(line.quantity, line.what, line.required, line.at_most, measured, is_judged, line.target)
+    return Requirement(
+        line.quantity, line.what, line.required, line.at_most, measured, is_judged, line.target
+    )
 
 
 def main(quantities: Sequence[str], result: Path, arguments: Sequence[str] | None = None) -> None:
     """Run `dhkit bench` on some quantities, and write the report with the targets."""
-    parser = argparse.ArgumentParser(description=f"dhkit beside its peers: {', '.join(quantities)}.")
-    parser.add_argument("--robot", default="puma560", help="of the library, or a robot file (default: puma560)")
-    parser.add_argument("--batch", type=int, default=BATCH, help="items of a batch (default: %(default)s)")
-    parser.add_argument("--threads", type=int, default=1, help="that batch calls may use (default: 1)")
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="rounds (default: %(default)s)")
+    parser = argparse.ArgumentParser(
+        description=f"dhkit beside its peers: {', '.join(quantities)}."
+    )
+    parser.add_argument(
+        "--robot", default="puma560", help="of the library, or a robot file (default: puma560)"
+    )
+    parser.add_argument(
+        "--batch", type=int, default=BATCH, help="items of a batch (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--threads", type=int, default=1, help="that batch calls may use (default: 1)"
+    )
+    parser.add_argument(
+        "--repeats", type=int, default=REPEATS, help="rounds (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--no-probes", dest="probes", action="store_false", help="no threads, memory and processes")
-    parser.add_argument("--output", type=Path, default=result, help="path of the results, without ending")
+    parser.add_argument(
+        "--no-probes", dest="probes", action="store_false", help="no threads, memory and processes"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=result, help="path of the results, without ending"
+    )
     chosen = vars(parser.parse_args(arguments))
     arm = Arm.load(chosen.pop("robot"))
     sys.exit(run(arm, quantities, **chosen, json=False, targets=targets))

@@ -63,7 +63,9 @@ def motion(lab, page):
     lab.answer("table.reset", {})
     switch_frames(page, "false")
     lab.answer("joints.named", {"name": "nominal"})
-    lab.answer("motion.plan", {"kind": "least-time", "goal": {"q": [1.2, 0.3, -0.8, 0.5, -0.6, 1.0]}})
+    lab.answer(
+        "motion.plan", {"kind": "least-time", "goal": {"q": [1.2, 0.3, -0.8, 0.5, -0.6, 1.0]}}
+    )
     page.until(f"{STATE}.motion && !{STATE}.job")
     page.evaluate("document.querySelector('#panel-motion select').value = 'least-time'")
     time.sleep(2.0)  # the player has shown the whole way, and the trace
@@ -77,7 +79,12 @@ def control(lab, page):
     """Show a controller that follows a sine with a load it does not know of, and was pushed."""
     lab.answer("motion.clear", {})
     lab.answer("joints.named", {"name": "nominal"})
-    settings = {"controller": "computed-torque", "bandwidth": 20.0, "payload": 2.5, "reference": "sine"}
+    settings = {
+        "controller": "computed-torque",
+        "bandwidth": 20.0,
+        "payload": 2.5,
+        "reference": "sine",
+    }
     lab.answer("control.start", settings)
     page.until(f"{STATE}.control.time > 4")
     lab.answer("control.push", {"link": None, "force": [0.0, 60.0, 0.0], "duration": 0.3})
@@ -107,7 +114,11 @@ def transforms(lab, page):
     """Show the course's box after two of three steps, without the arm."""
     lab.answer("workspace.show", {"kind": "none"})
     own = "dhkit.lab.panels.find(panel => panel.name === 'transforms').panel"
-    steps = [("turn", "z", "30°", "fixed"), ("move", "y", "0.3", "current"), ("turn", "x", "60°", "current")]
+    steps = [
+        ("turn", "z", "30°", "fixed"),
+        ("move", "y", "0.3", "current"),
+        ("turn", "x", "60°", "current"),
+    ]
     listed = [dict(zip(("kind", "axis", "amount", "about"), step, strict=True)) for step in steps]
     page.evaluate(f"{own}.change(() => ({own}.steps = {json.dumps(listed)}))")
     page.evaluate("document.querySelector('#panel-transforms input[type=checkbox]').click()")
@@ -172,14 +183,18 @@ def main() -> None:
         sys.stderr.write(f"docs/lab-*.png stay as they are: {error} (pip install '.[test]')\n")
         return
     if BINARY is None:
-        sys.stderr.write("docs/lab-*.png stay as they are: Chromium is not installed (apt-get install chromium)\n")
+        sys.stderr.write(
+            "docs/lab-*.png stay as they are: Chromium is not installed (apt-get install chromium)\n"
+        )
         return
     browser = Chromium()
     try:
         with Lab(dhkit.Arm.load("puma560")) as lab:
             page = browser.page(*SIZE)
             page.open(lab.url)
-            page.until("globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints")
+            page.until(
+                "globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints"
+            )
             for name, prepare in PANELS.items():
                 page.evaluate(f"document.getElementById('tab-{name}').click()")
                 prepare(lab, page)

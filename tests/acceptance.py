@@ -37,13 +37,24 @@ def sample_size(full: int, quick: int | None = None) -> int:
     return max(min(full, FEWEST), full // SHARE)
 
 
-DIFFERENT_ROBOTS = ("planar2r", "puma560", "stanford", "cobra600", "panda", "manutec_r3", "ax12_arm")
+DIFFERENT_ROBOTS = (
+    "planar2r",
+    "puma560",
+    "stanford",
+    "cobra600",
+    "panda",
+    "manutec_r3",
+    "ax12_arm",
+)
 """Robots that differ in kind: few joints, a PUMA, prismatic joints, seven joints, a coupling, tiny links."""
 
 
 def different_robots_first(names: Sequence[str]) -> list[object]:
     """Return the cases of a law of every robot: robots of different kinds, and all the others in `make accept`."""
-    return [name if name in DIFFERENT_ROBOTS else pytest.param(name, marks=only_accepting) for name in names]
+    return [
+        name if name in DIFFERENT_ROBOTS else pytest.param(name, marks=only_accepting)
+        for name in names
+    ]
 
 
 def slow_if(slow: bool, *values: object) -> object:
@@ -53,7 +64,9 @@ def slow_if(slow: bool, *values: object) -> object:
 
 def in_time(seconds: float, required: float) -> None:
     """Hold a time to what is required in `make accept` alone: elsewhere a tracer or a busy machine decides."""
-    assert not ACCEPTING or seconds <= required, f"{seconds:.3g} s, required at most {required:.3g} s"
+    assert not ACCEPTING or seconds <= required, (
+        f"{seconds:.3g} s, required at most {required:.3g} s"
+    )
 
 
 class Law:
@@ -112,10 +125,18 @@ class Recorder:
         self.rows += law.rows()
         if ACCEPTING:
             for row in law.rows():
-                print(f"\n  {row['quantity']}: {row['seen']:.3g} of at most {row['required']:.3g}", end="")
+                print(
+                    f"\n  {row['quantity']}: {row['seen']:.3g} of at most {row['required']:.3g}",
+                    end="",
+                )
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if not ACCEPTING or hasattr(session.config, "workerinput") or not self.rows or not _is_whole(session.config):
+        if (
+            not ACCEPTING
+            or hasattr(session.config, "workerinput")
+            or not self.rows
+            or not _is_whole(session.config)
+        ):
             return
         packages = ("numpy", "llvmlite", "casadi", "pin", "yourdfpy", "eaik", "ssik", "hypothesis")
         RESULTS.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +146,9 @@ class Recorder:
                     "python": platform.python_version(),
                     "machine": platform.machine(),
                     "packages": {package: version(package) for package in packages},
-                    "laws": sorted(self.rows, key=lambda row: (str(row["law"]), str(row["quantity"]))),
+                    "laws": sorted(
+                        self.rows, key=lambda row: (str(row["law"]), str(row["quantity"]))
+                    ),
                 },
                 indent=1,
             )
@@ -141,7 +164,10 @@ class Recorder:
         worst: dict[str, tuple[float, float, int]] = {}
         for row in self.rows:
             name = f"{str(row['law']).split('[')[0]}: {row['quantity']}"
-            seen, count = max(worst.get(name, (-math.inf, 0.0, 0))[0], row["seen"]), worst.get(name, (0, 0, 0))[2] + 1
+            seen, count = (
+                max(worst.get(name, (-math.inf, 0.0, 0))[0], row["seen"]),
+                worst.get(name, (0, 0, 0))[2] + 1,
+            )
             worst[name] = (seen, row["required"], count)
         terminalreporter.section("laws: worst seen, required")
         for name, (seen, required, count) in worst.items():
@@ -154,7 +180,9 @@ def _left_out(config: pytest.Config) -> str:
     if config.option.markexpr == "not slow":
         return f"Left out: tests that take seconds, and all with a browser: make test-all; {laws}"
     if config.option.markexpr == "not slow or browser":
-        return f"Left out: tests that take seconds but for those with a browser: make test-all; {laws}"
+        return (
+            f"Left out: tests that take seconds but for those with a browser: make test-all; {laws}"
+        )
     return f"Left out: {laws}"
 
 

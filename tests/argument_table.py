@@ -26,7 +26,12 @@ PACKAGES = (
     "viewer",
     "lab",
 )
-FILE = {"str | Path", "str | Path | None", "str | Path | Sequence[str]", "str | Path | Sequence[str] | None"}
+FILE = {
+    "str | Path",
+    "str | Path | None",
+    "str | Path | Sequence[str]",
+    "str | Path | Sequence[str] | None",
+}
 JOINTS = {"ArrayLike", "ArrayLike | None", "ArrayLike | str"}
 KINDS: dict[str, tuple[str, dict[str, set[str]]]] = {
     "arm": (
@@ -106,7 +111,16 @@ NOT_CALLED = {
     "programs.random_states",
 }
 """Results, values of a robot file and steps of other functions: they take what has been checked; points in space."""
-COMPUTED = ("Array", "Array | None", "NDArray", "casadi.SX", "Elements", "Scalar", "Point", "ForwardRef")
+COMPUTED = (
+    "Array",
+    "Array | None",
+    "NDArray",
+    "casadi.SX",
+    "Elements",
+    "Scalar",
+    "Point",
+    "ForwardRef",
+)
 """Annotations of what dhkit hands to itself: results' fields, steps of a simulation, symbols."""
 
 
@@ -146,7 +160,10 @@ def table() -> str:
     ]
     lines += [f"| {kind} | {words} | {_code(names)} |" for kind, (words, names) in KINDS.items()]
     lines += ["", f"| function | {' | '.join(KINDS)} |", f"|---|{'---|' * len(KINDS)}"]
-    lines += [f"| `{row.name}` | {' | '.join(_code(row.takes.get(kind, ())) for kind in KINDS)} |" for row in rows()]
+    lines += [
+        f"| `{row.name}` | {' | '.join(_code(row.takes.get(kind, ())) for kind in KINDS)} |"
+        for row in rows()
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -180,7 +197,9 @@ def _functions() -> Iterator[tuple[str, object]]:
                 if issubclass(one, (Exception, Enum)):
                     continue
                 yield f"{package}.{name}", one
-                yield from ((f"{package}.{name}.{inner}", method) for inner, method in _members(one))
+                yield from (
+                    (f"{package}.{name}.{inner}", method) for inner, method in _members(one)
+                )
             elif inspect.isroutine(inspect.unwrap(one)):
                 yield f"{package}.{name}", inspect.unwrap(one)
 

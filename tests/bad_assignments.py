@@ -1,7 +1,8 @@
 """Assignments that are wrong, by what is wrong: the file, and a part of the complaint."""
 
 HEAD = (
-    'kind = "assignment"\nformat = 1\ntitle = "T"\nrobot = "planar2r"\nstart = "ready"\npanels = ["joints", "motion"]\n'
+    'kind = "assignment"\nformat = 1\ntitle = "T"\nrobot = "planar2r"\n'
+    'start = "ready"\npanels = ["joints", "motion"]\n'
 )
 STEP = '[[step]]\ntitle = "one"\ntext = "some words"\npanel = "joints"\n'
 JOINTS = '[[step.goal]]\ntext = "a"\njoints = ["pi/2", 0]\n'
@@ -13,7 +14,10 @@ GOOD = HEAD + STEP + JOINTS + POSE + MOTION + SCORE
 
 ROBOT = 'robot = "planar2r"'
 BAD = {
-    "mistyped key": (GOOD.replace("title", "titel", 1), "unknown key 'titel'; did you mean 'title'?"),
+    "mistyped key": (
+        GOOD.replace("title", "titel", 1),
+        "unknown key 'titel'; did you mean 'title'?",
+    ),
     "unknown key": (
         GOOD.replace("format", "colour = 3\nformat", 1),
         "unknown key 'colour'; expected one of kind, format",
@@ -26,22 +30,37 @@ BAD = {
         GOOD.replace("duration", "durations"),
         "step 1: goal 3: motion: unknown key 'durations'; did you mean 'duration'?",
     ),
-    "goal outside a step": (HEAD + JOINTS.replace("step.goal", "goal") + STEP, "unknown key 'goal'"),
+    "goal outside a step": (
+        HEAD + JOINTS.replace("step.goal", "goal") + STEP,
+        "unknown key 'goal'",
+    ),
     "no title": (GOOD.replace('title = "T"\n', ""), "key 'title' is missing"),
     "no kind": (GOOD.replace('kind = "assignment"\n', ""), "key 'kind' is missing"),
-    "another kind": (GOOD.replace('"assignment"', '"exam"'), "kind: found 'exam'; expected 'assignment'"),
+    "another kind": (
+        GOOD.replace('"assignment"', '"exam"'),
+        "kind: found 'exam'; expected 'assignment'",
+    ),
     "another format": (GOOD.replace("format = 1", "format = 2"), "format: found 2; expected 1"),
-    "unknown panel": (GOOD.replace('"motion"]', '"motions"]'), "panels[1]: no panel 'motions'; did you mean 'motion'?"),
+    "unknown panel": (
+        GOOD.replace('"motion"]', '"motions"]'),
+        "panels[1]: no panel 'motions'; did you mean 'motion'?",
+    ),
     "unknown panel, far off": (
         GOOD.replace('"motion"]', '"cake"]'),
         "panels[1]: no panel 'cake'; expected one of joints, tool,",
     ),
-    "panel of a step": (GOOD.replace('panel = "joints"', 'panel = "task"'), "step 1: panel: no panel 'task'"),
+    "panel of a step": (
+        GOOD.replace('panel = "joints"', 'panel = "task"'),
+        "step 1: panel: no panel 'task'",
+    ),
     "panel that is not shown": (
         GOOD.replace('panel = "joints"', 'panel = "tool"'),
         "step 1: panel: found 'tool'; expected one that panels lists",
     ),
-    "no panels": (GOOD.replace('["joints", "motion"]', "[]"), "panels: found 0 entries; expected at least 1"),
+    "no panels": (
+        GOOD.replace('["joints", "motion"]', "[]"),
+        "panels: found 0 entries; expected at least 1",
+    ),
     "panels of another type": (
         GOOD.replace('["joints", "motion"]', '"joints"'),
         "panels: found 'joints'; expected a list",
@@ -51,7 +70,10 @@ BAD = {
         GOOD.replace(ROBOT, 'robot = "../arm.toml"'),
         "robot: '../arm.toml' leaves the assignment's folder",
     ),
-    "absolute path": (GOOD.replace(ROBOT, 'robot = "/etc/arm.toml"'), "leaves the assignment's folder"),
+    "absolute path": (
+        GOOD.replace(ROBOT, 'robot = "/etc/arm.toml"'),
+        "leaves the assignment's folder",
+    ),
     "no such robot file": (GOOD.replace(ROBOT, 'robot = "arm.toml"'), "no such file"),
     "name with a NUL": (GOOD.replace(ROBOT, r'robot = "a\u0000.toml"'), "is not a file name"),
     "itself as robot": (GOOD.replace(ROBOT, 'robot = "task.toml"'), "robot: "),
@@ -69,13 +91,22 @@ BAD = {
     "21 goals": (HEAD + STEP + 21 * JOINTS, "step 1: goal: found 21 entries; expected at most 20"),
     "no steps": (HEAD, "key 'step' is missing"),
     "steps of another type": (HEAD + 'step = "one"\n', "step: found 'one'; expected a list"),
-    "long text": (GOOD.replace("some words", 4001 * "x"), "step 1: text: found 4001 characters; expected at most 4000"),
+    "long text": (
+        GOOD.replace("some words", 4001 * "x"),
+        "step 1: text: found 4001 characters; expected at most 4000",
+    ),
     "long title": (
         GOOD.replace('"one"', f'"{201 * "x"}"'),
         "step 1: title: found 201 characters; expected at most 200",
     ),
-    "title of two lines": (GOOD.replace('"one"', r'"one\ntwo"'), "step 1: title: found several lines; expected one"),
-    "empty title": (GOOD.replace('"one"', '" "'), "step 1: title: found an empty text; expected words"),
+    "title of two lines": (
+        GOOD.replace('"one"', r'"one\ntwo"'),
+        "step 1: title: found several lines; expected one",
+    ),
+    "empty title": (
+        GOOD.replace('"one"', '" "'),
+        "step 1: title: found an empty text; expected words",
+    ),
     "control character": (
         GOOD.replace("some words", r"some \u001b[31m words"),
         "step 1: text: found the control character U+001B",
@@ -89,7 +120,10 @@ BAD = {
         GOOD.replace('text = "a"', 'text = "a"\nown = { function = "ik" }'),
         "step 1: goal 1: found joints and own; expected exactly one of pose, joints, motion, own",
     ),
-    "no condition": (GOOD.replace('joints = ["pi/2", 0]', ""), "step 1: goal 1: found none; expected exactly one of"),
+    "no condition": (
+        GOOD.replace('joints = ["pi/2", 0]', ""),
+        "step 1: goal 1: found none; expected exactly one of",
+    ),
     "NaN": (
         GOOD.replace("[0.5, 0.4, 0.0]", "[nan, 0.4, 0.0]"),
         "step 1: goal 2: pose.xyz[0]: found nan; expected a finite number",
@@ -102,7 +136,10 @@ BAD = {
         GOOD.replace("[0.5, 0.4, 0.0]", f"[{300 * '9'}, 0, 0]"),
         "expected a finite number of at most 10000",
     ),
-    "number beyond a double": (GOOD.replace("[0.5, 0.4, 0.0]", f"[{700 * '9'}, 0, 0]"), "beyond the range of a double"),
+    "number beyond a double": (
+        GOOD.replace("[0.5, 0.4, 0.0]", f"[{700 * '9'}, 0, 0]"),
+        "beyond the range of a double",
+    ),
     "pose of two": (
         GOOD.replace("[0.5, 0.4, 0.0]", "[0.5, 0.4]"),
         "step 1: goal 2: pose.xyz: found 2 entries; expected at least 3",
@@ -139,12 +176,18 @@ BAD = {
         GOOD.replace('to = "zero"', 'to = "home"'),
         "step 1: goal 3: motion.to: planar2r has no configuration 'home'",
     ),
-    "motion without an end": (GOOD.replace('to = "zero", ', ""), "step 1: goal 3: motion: key 'to' is missing"),
+    "motion without an end": (
+        GOOD.replace('to = "zero", ', ""),
+        "step 1: goal 3: motion: key 'to' is missing",
+    ),
     "motion that stays": (
         GOOD.replace('to = "zero"', 'to = "ready"'),
         "motion: it ends where it begins; expected two configurations",
     ),
-    "motion without time": (GOOD.replace("duration = 1.0", "duration = 0"), "motion.duration: found 0"),
+    "motion without time": (
+        GOOD.replace("duration = 1.0", "duration = 0"),
+        "motion.duration: found 0",
+    ),
     "unknown function": (
         GOOD.replace('"fk"', '"jacobian"'),
         "own.function: found 'jacobian'; expected 'fk', 'ik' or 'controller'",
@@ -157,7 +200,10 @@ BAD = {
         GOOD.replace("points = 2", "points = -2"),
         "step 1: goal 2: points: found -2; expected greater than or equal to 0",
     ),
-    "points as text": (GOOD.replace("points = 2", 'points = "2"'), "points: found '2'; expected a number"),
+    "points as text": (
+        GOOD.replace("points = 2", 'points = "2"'),
+        "points: found '2'; expected a number",
+    ),
     "tolerance of another type": (
         GOOD.replace('text = "b"', 'text = "b"\ntolerance = 0.1'),
         "step 1: goal 2: tolerance: found 0.1; expected a table",

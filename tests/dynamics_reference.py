@@ -44,7 +44,11 @@ def coupled(draw, arm):
 def motions(arm, count, seed=0):
     """Return random q, qd and a third vector for accelerations or torques, each (count, n)."""
     rng = np.random.default_rng(seed)
-    return random_states(arm, count, seed), rng.uniform(-3, 3, (count, arm.n)), rng.uniform(-5, 5, (count, arm.n))
+    return (
+        random_states(arm, count, seed),
+        rng.uniform(-3, 3, (count, arm.n)),
+        rng.uniform(-5, 5, (count, arm.n)),
+    )
 
 
 def reference(arm, q, qd, x):
@@ -58,7 +62,9 @@ def reference(arm, q, qd, x):
         return np.triu(M) + np.triu(M, 1).T
 
     def each(function, *arrays):
-        return np.array([np.array(function(model, data, *rows)) for rows in zip(*arrays, strict=True)])
+        return np.array(
+            [np.array(function(model, data, *rows)) for rows in zip(*arrays, strict=True)]
+        )
 
     # Pinocchio knows no couplings: B is written down from the description's own list.
     B = np.zeros((n, n))
@@ -74,7 +80,9 @@ def reference(arm, q, qd, x):
         "h": np.einsum("kij,kj->ki", C, qd),  # the bias less g would have lost digits
         "bias": bias,
         "tau": each(pin.rnea, q, qd, x) + x @ B,
-        "qdd": np.linalg.solve(M, (x - bias)[..., None])[..., 0] if B.any() else each(pin.aba, q, qd, x),
+        "qdd": np.linalg.solve(M, (x - bias)[..., None])[..., 0]
+        if B.any()
+        else each(pin.aba, q, qd, x),
         "K": each(pin.computeKineticEnergy, q, qd) + np.einsum("ki,ij,kj->k", qd, B, qd) / 2,
         "V": each(pin.computePotentialEnergy, q),
     }
@@ -84,7 +92,14 @@ def hold(law, arm, ours, q, qd, x, path):
     """Hold what we computed, by the names of ``reference``, against Pinocchio."""
     theirs = reference(arm, q, qd, x)
     floors = Floors.of(arm, theirs["M"], qd, x, x)
-    floor = {"M": 0.0, "C": floors.C, "g": floors.g, "h": floors.h, "bias": floors.bias, "tau": floors.tau}
+    floor = {
+        "M": 0.0,
+        "C": floors.C,
+        "g": floors.g,
+        "h": floors.h,
+        "bias": floors.bias,
+        "tau": floors.tau,
+    }
     floor |= {"qdd": floors.qdd, "K": floors.h, "V": floors.g}
     scale = forward_tolerance(theirs["M"]) / TOLERANCE
     for name, values in ours.items():

@@ -17,7 +17,9 @@ def states(description: Description, samples: int, seed: int = 0):
     return q, rng.normal(size=q.shape), rng.normal(size=q.shape) * 3
 
 
-def errors(lag, samples: int, quantities=("M", "C", "h", "g", "tau", "K", "V"), seed: int = 0) -> dict[str, float]:
+def errors(
+    lag, samples: int, quantities=("M", "C", "h", "g", "tau", "K", "V"), seed: int = 0
+) -> dict[str, float]:
     """Return the worst error of each quantity against Pinocchio, by the measure of verification."""
     import pinocchio as pin
 
@@ -34,13 +36,25 @@ def errors(lag, samples: int, quantities=("M", "C", "h", "g", "tau", "K", "V"), 
         C = np.reshape(pin.computeCoriolisMatrix(model, data, *state[:2]), (n, n)).copy()
         reference["C"].append(C)
         reference["h"].append(C @ state[1])
-        reference["g"].append(np.array(pin.computeGeneralizedGravity(model, data, state[0])).reshape(n))
+        reference["g"].append(
+            np.array(pin.computeGeneralizedGravity(model, data, state[0])).reshape(n)
+        )
         reference["tau"].append(np.array(pin.rnea(model, data, *state)).reshape(n) + B @ state[2])
-        reference["K"].append(pin.computeKineticEnergy(model, data, *state[:2]) + state[1] @ B @ state[1] / 2)
+        reference["K"].append(
+            pin.computeKineticEnergy(model, data, *state[:2]) + state[1] @ B @ state[1] / 2
+        )
         reference["V"].append(pin.computePotentialEnergy(model, data, state[0]))
     reference = {name: np.array(values) for name, values in reference.items()}
     floors = Floors.of(description, reference["M"], qd, qdd, reference["tau"])
-    floor = {"M": 0.0, "C": floors.C, "h": floors.h, "g": floors.g, "tau": floors.tau, "K": floors.h, "V": floors.g}
+    floor = {
+        "M": 0.0,
+        "C": floors.C,
+        "h": floors.h,
+        "g": floors.g,
+        "tau": floors.tau,
+        "K": floors.h,
+        "V": floors.g,
+    }
     found = {}
     for name in quantities:
         ours = lag.evaluate(getattr(lag, name), q, qd, qdd)

@@ -23,7 +23,9 @@ def check_damaged(draw, read, path):
     content = bytearray(path.read_bytes())
     for _ in range(draw(st.integers(1, 4))):
         content[draw(st.integers(0, len(content) - 1))] = draw(st.integers(0, 255))
-    path.write_bytes(content[: draw(st.integers(0, len(content)))] if draw(st.booleans()) else content)
+    path.write_bytes(
+        content[: draw(st.integers(0, len(content)))] if draw(st.booleans()) else content
+    )
     try:
         read(path)
         message = ""

@@ -115,8 +115,12 @@ WRONG = {
     "tower of quotients of angles": "1/(cos(q1)+m1/(sin(q2)+l1*" * 20 + "m2" + "))" * 20,
     "division": f"{NINE}^6/(m1 - l1 + m2 - cos(q2))^5",
     "hundreds of decimals": " + ".join(f"{1 + k / 7:.5f}*m1" for k in range(500)),
-    "thousands of decimals": " + ".join(f"{1 + k / 7:.5f}*m1^{k % 60}*l1^{k // 60}" for k in range(3_000)),
-    "decimals in products": "*".join(f"({1 + k / 7:.5f}*m1 + {2 + k / 7:.5f}*l1)" for k in range(150)),
+    "thousands of decimals": " + ".join(
+        f"{1 + k / 7:.5f}*m1^{k % 60}*l1^{k // 60}" for k in range(3_000)
+    ),
+    "decimals in products": "*".join(
+        f"({1 + k / 7:.5f}*m1 + {2 + k / 7:.5f}*l1)" for k in range(150)
+    ),
     "long fractions": " + ".join(f"1/{10**39 + k}" for k in range(4_000)),
     "longer fractions": " + ".join(f"1/{10**300 + k}" for k in range(500)),
     "powers of fractions": "(1/3 + 1e-300)^64*" * 50 + "1",
@@ -149,7 +153,9 @@ WRONG = {
 # What is right, but cannot be proved, and takes long to try.
 SLOW = {
     "half angles": f"{RIGHT_V} + 0*(" + " + ".join(f"sin(q1/{k + 2})" for k in range(10_000)) + ")",
-    "half angles of few": f"{RIGHT_V} + 0*(" + " + ".join(f"sin(q1/{k + 2})" for k in range(50)) + ")",
+    "half angles of few": f"{RIGHT_V} + 0*("
+    + " + ".join(f"sin(q1/{k + 2})" for k in range(50))
+    + ")",
 }
 
 
@@ -160,7 +166,9 @@ def made(value):
 
 def quoted(text):
     """Return text as a basic string of TOML; a half of a character, which TOML cannot have, as a question mark."""
-    return json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False).replace("\x7f", "\\u007f")
+    return json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False).replace(
+        "\x7f", "\\u007f"
+    )
 
 
 def sheet(answer, robot="planar2r", more=""):
@@ -226,8 +234,12 @@ SHEETS = {
     "brackets around a matrix": sheet(f"M = '{'(' * 90_000}{')' * 90_000}'"),
     "transposes of a matrix": sheet(f'M = "[1]{chr(39) * LONG}"'),
     "rows of rows": sheet(f"M = '[{'[1],' * 40_000}]'"),
-    "names that are none": sheet('V = "1"', more=f"[names]\nq = [{quoted('k' * 100_000 + '-')}, 'b']"),
-    "a name for two things": sheet('V = "1"', more=f"[names]\nq = [{quoted('k' * 100_000)}, {quoted('k' * 100_000)}]"),
+    "names that are none": sheet(
+        'V = "1"', more=f"[names]\nq = [{quoted('k' * 100_000 + '-')}, 'b']"
+    ),
+    "a name for two things": sheet(
+        'V = "1"', more=f"[names]\nq = [{quoted('k' * 100_000)}, {quoted('k' * 100_000)}]"
+    ),
     "a name with control characters": sheet(
         'V = "1"', more=f"names.parameters.{quoted(chr(27) + '[2J' + chr(10))} = 'x'"
     ),
@@ -235,25 +247,44 @@ SHEETS = {
     "names of themselves": sheet("V = 'a'", more="[names.parameters]\na = 'b'\nb = 'a'"),
     "names that double": sheet(
         "V = 'a40'",
-        more="[names.parameters]\na0 = '1+1'\n" + "".join(f"a{k + 1} = 'a{k}+a{k}*a{k}'\n" for k in range(40)),
+        more="[names.parameters]\na0 = '1+1'\n"
+        + "".join(f"a{k + 1} = 'a{k}+a{k}*a{k}'\n" for k in range(40)),
     ),
     "names that flood an entry": sheet(f"V = '{'+'.join(['a'] * 95_000)}'", more=NAMES_FLOOD),
-    "names that flood a name": sheet("V = 'b'", more=NAMES_FLOOD + f"b = '{'+'.join(['a'] * 95_000)}'"),
-    "names in powers": sheet(
-        "V = 'a9'", more="[names.parameters]\na0 = 'm1+l1'\n" + "".join(f"a{k + 1} = 'a{k}^8'\n" for k in range(9))
+    "names that flood a name": sheet(
+        "V = 'b'", more=NAMES_FLOOD + f"b = '{'+'.join(['a'] * 95_000)}'"
     ),
-    "too many names": sheet("V = '1'", more="[names.parameters]\n" + "".join(f"a{k} = '1'\n" for k in range(1_000))),
+    "names in powers": sheet(
+        "V = 'a9'",
+        more="[names.parameters]\na0 = 'm1+l1'\n"
+        + "".join(f"a{k + 1} = 'a{k}^8'\n" for k in range(9)),
+    ),
+    "too many names": sheet(
+        "V = '1'", more="[names.parameters]\n" + "".join(f"a{k} = '1'\n" for k in range(1_000))
+    ),
     "table of no rows": sheet("dh.rows = []"),
     "table of texts": sheet("dh.rows = ['q1', 'q2']"),
     "table of powers": sheet("dh.rows = [['q1', '0', 'g^g^g', '0'], ['q2', '0', 'l2', '0']]"),
-    "table of no number": sheet("dh.rows = [['q1', '0', '(l1-3*l1)^l2', '0'], ['q2', '0', 'l2', '0']]"),
-    "table of a power of zero": sheet("dh.rows = [['q1', '0', '(l1-l1)^(-l2)', '0'], ['q2', '0', 'l2', '0']]"),
-    "table of infinities": sheet("dh.rows = [['1/0', '0/0', 'exp(exp(9999))', 'sqrt(-1)'], ['q2', '0', 'l2', '0']]"),
-    "table of large numbers": sheet("dh.rows = [['q1*1e300', '1e300', '1e308', '1e300'], ['q2', '0', 'l2', '0']]"),
-    "table of long sums": sheet(f"dh.rows = [['q1', '0', '{'+'.join(['l1'] * 30_000)}', '0'], ['q2', '0', 'l2', '0']]"),
+    "table of no number": sheet(
+        "dh.rows = [['q1', '0', '(l1-3*l1)^l2', '0'], ['q2', '0', 'l2', '0']]"
+    ),
+    "table of a power of zero": sheet(
+        "dh.rows = [['q1', '0', '(l1-l1)^(-l2)', '0'], ['q2', '0', 'l2', '0']]"
+    ),
+    "table of infinities": sheet(
+        "dh.rows = [['1/0', '0/0', 'exp(exp(9999))', 'sqrt(-1)'], ['q2', '0', 'l2', '0']]"
+    ),
+    "table of large numbers": sheet(
+        "dh.rows = [['q1*1e300', '1e300', '1e308', '1e300'], ['q2', '0', 'l2', '0']]"
+    ),
+    "table of long sums": sheet(
+        f"dh.rows = [['q1', '0', '{'+'.join(['l1'] * 30_000)}', '0'], ['q2', '0', 'l2', '0']]"
+    ),
     "no branches": sheet("ik.branches = []"),
     "too many branches": sheet("ik.branches = [" + "['1', '1']," * 65 + "]"),
-    "many branches": sheet("ik.branches = [" + "['atan2(py,px)+acos(px)', 'sqrt(px^2+py^2)']," * 64 + "]"),
+    "many branches": sheet(
+        "ik.branches = [" + "['atan2(py,px)+acos(px)', 'sqrt(px^2+py^2)']," * 64 + "]"
+    ),
     "branch of powers": sheet("ik.branches = [['g^g^g', '1']]"),
     "branch of no number": sheet("ik.branches = [['(l1-3*l1)^l2', '1']]"),
     "branch of an angle of no number": sheet("ik.branches = [['atan2((l1-3*l1)^l2, 1)', '1']]"),
@@ -273,7 +304,9 @@ SHEETS = {
 }
 
 ADDED = {
-    "rubric": sheet('V = "1"', more='[rubric]\npoints = "__import__(1)"\n[rubric.weights]\nV = "inf"'),
+    "rubric": sheet(
+        'V = "1"', more='[rubric]\npoints = "__import__(1)"\n[rubric.weights]\nV = "inf"'
+    ),
     "student": sheet('V = "1"', more='student = "\\u001b[2J\\n../../etc/passwd\\u0000<script>"'),
     "names of functions": sheet("V = 'sin(q1)'", more="[names]\nq = ['sin', 'cos']"),
     "names of pi": sheet("V = 'pi'", more="[names.parameters]\npi = '3'\nm1 = 'l1'"),
@@ -290,7 +323,10 @@ SOURCES = {
     "Python's semicolons": (".py", ";" * 990_000),
     "Python's semicolons in a bracket": (".py", "(" + ";" * 990_000),
     "Python's assignments": (".py", "V = 1\n" * 100_000),
-    "Python's names": (".py", "".join(f"{'x' * 60}{k} = m1 + {'x' * 60}{k}\n" for k in range(4_000)) + "V = m1"),
+    "Python's names": (
+        ".py",
+        "".join(f"{'x' * 60}{k} = m1 + {'x' * 60}{k}\n" for k in range(4_000)) + "V = m1",
+    ),
     "Python's doubling": (
         ".py",
         "a0 = m1+1\n" + "".join(f"a{k + 1} = a{k}*a{k}+a{k}\n" for k in range(90)) + "V = a90",
@@ -304,10 +340,14 @@ SOURCES = {
     "MATLAB's energy with indices": (".m", "K(1,1)=1\nK(1,2)=2\nK(2,1)=3;K(2,2)=4"),
     "MATLAB's primes": (".m", "V = m1" + "'" * 990_000),
     "Python's length": (".py", "V = m1\n" + "#" * 3_900_000),
-    "LaTeX": (".tex", f"\\input{{{SECRET}}}\n\\immediate\\write18{{{TOUCH}}}\n\\[ V = \\input{{{SECRET}}} \\]"),
+    "LaTeX": (
+        ".tex",
+        f"\\input{{{SECRET}}}\n\\immediate\\write18{{{TOUCH}}}\n\\[ V = \\input{{{SECRET}}} \\]",
+    ),
     "LaTeX's macros": (
         ".tex",
-        "".join(f"\\def\\{chr(97 + k)}{{\\{chr(98 + k) * 2}}}\n" for k in range(24)) + "\\[V=\\a\\]",
+        "".join(f"\\def\\{chr(97 + k)}{{\\{chr(98 + k) * 2}}}\n" for k in range(24))
+        + "\\[V=\\a\\]",
     ),
     "LaTeX's matrices": (".tex", "\\begin{bmatrix}" * 60_000),
     "LaTeX's rows": (".tex", "\\begin{bmatrix}" + "\\\\" * 490_000),
@@ -317,7 +357,16 @@ SOURCES = {
     "LaTeX's comments": (".tex", "\\%" * 440_000 + "\n" + "%" * 100_000),
     "notebook": (
         ".ipynb",
-        json.dumps({"cells": [{"cell_type": "code", "source": f"!{TOUCH}\nV = get_ipython().system('{TOUCH}')"}]}),
+        json.dumps(
+            {
+                "cells": [
+                    {
+                        "cell_type": "code",
+                        "source": f"!{TOUCH}\nV = get_ipython().system('{TOUCH}')",
+                    }
+                ]
+            }
+        ),
     ),
     "notebook that is deep": (".ipynb", "[" * 3_000_000),
     "notebook with long numbers": (".ipynb", '{"cells": ' + "9" * 5_000 + "}"),
@@ -369,7 +418,11 @@ ROBOTS = {
     "no TOML": ("import os", A1),
     "33 joints": (symbolic(33), 'V = "1"'),
     "a mesh outside": (
-        robot(ONE.format(a=1).replace("theta = 0", f'theta = 0\nshape = {{ mesh = "../{SECRET.name}" }}')),
+        robot(
+            ONE.format(a=1).replace(
+                "theta = 0", f'theta = 0\nshape = {{ mesh = "../{SECRET.name}" }}'
+            )
+        ),
         A1,
     ),
     "a mesh from the root": (
@@ -380,7 +433,10 @@ ROBOTS = {
     "code in a joint": (robot(ONE.format(a="\"__import__('os').abort()\"")), A1),
     "a tower of powers": (robot(ONE.format(a='"a"'), 'a = "9^9^9"'), A1),
     "parameters that double": (
-        robot(ONE.format(a='"a59"'), 'a0 = "1+pi"\n' + "".join(f'a{k + 1} = "a{k}*a{k}+a{k}"\n' for k in range(59))),
+        robot(
+            ONE.format(a='"a59"'),
+            'a0 = "1+pi"\n' + "".join(f'a{k + 1} = "a{k}*a{k}+a{k}"\n' for k in range(59)),
+        ),
         A1,
     ),
     "parameters of themselves": (robot(ONE.format(a='"a"'), 'a = "b"\nb = "a"'), A1),
@@ -388,7 +444,10 @@ ROBOTS = {
     "deep keys": ("a" + ".a" * 300_000 + " = 1", A1),
     "long numbers": (robot(ONE.format(a='"a"'), "a = 0x" + "f" * 5_000), A1),
     "huge exponents": (robot(ONE.format(a='"a"'), "a = 1e99999999999999999999999"), A1),
-    "names of tags": (robot(ONE.format(a=1), '"<b>" = 1.0', "\x1b[31m<script>alert(1)</script>"), A1),
+    "names of tags": (
+        robot(ONE.format(a=1), '"<b>" = 1.0', "\x1b[31m<script>alert(1)</script>"),
+        A1,
+    ),
     "names of joints": (robot(ONE.format(a='"q1"'), "q1 = 1.0"), A1),
     "not a number": (robot(ONE.format(a="nan")), A1),
     "more than 1 MB": (robot(ONE.format(a=1), "# " * 600_000), A1),
@@ -435,8 +494,12 @@ OBJECTS = {
     "CasADi's long sum": lambda: casadi_chain(3_000, lambda ca, x, m: x + ca.sin(x)),
     "CasADi's endless chain": lambda: casadi_chain(50_000, lambda ca, x, m: ca.sin(x) + m),
     "CasADi's shared squares": lambda: casadi_chain(60, lambda ca, x, m: x * x + m),
-    "CasADi's shared sines": lambda: casadi_chain(60, lambda ca, x, m: ca.cos(x) * ca.sin(x * x) + x),
-    "CasADi's names": lambda: casadi_chain(1, lambda ca, x, m: ca.SX.sym("__import__('os').abort()")),
+    "CasADi's shared sines": lambda: casadi_chain(
+        60, lambda ca, x, m: ca.cos(x) * ca.sin(x * x) + x
+    ),
+    "CasADi's names": lambda: casadi_chain(
+        1, lambda ca, x, m: ca.SX.sym("__import__('os').abort()")
+    ),
     "CasADi's infinity": lambda: casadi_chain(1, lambda ca, x, m: m * ca.SX(float("inf"))),
     "CasADi's error function": lambda: casadi_chain(1, lambda ca, x, m: ca.erf(m)),
     "CasADi's condition": lambda: casadi_chain(1, lambda ca, x, m: ca.if_else(m > 0, m, 2)),

@@ -19,10 +19,21 @@ FAMILY_A = (
 )
 FAMILY_B = ("ur3", "ur5", "ur10")
 SIX_JOINTS = (*FAMILY_A, *FAMILY_B, "stanford")
-FEW_JOINTS = ("cobra600", "planar2r", "planar3r", "polar_rp", "cart_pendulum", "pan_tilt", "ax12_arm", "al5d")
+FEW_JOINTS = (
+    "cobra600",
+    "planar2r",
+    "planar3r",
+    "polar_rp",
+    "cart_pendulum",
+    "pan_tilt",
+    "ax12_arm",
+    "al5d",
+)
 
 
-def closure(arm: Description, solutions: IKSolutions, T: np.ndarray, fk=forward_kinematics) -> float:
+def closure(
+    arm: Description, solutions: IKSolutions, T: np.ndarray, fk=forward_kinematics
+) -> float:
     """Return the worst error of forward kinematics of all returned branches, lengths over the reach.
 
     For one arm of many take ``fk=world_to_tool``: it needs no kernel of the arm's own.

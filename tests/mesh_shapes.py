@@ -17,7 +17,9 @@ def sphere(rings=24, sides=48, radius=1.0):
     """A sphere's polyhedron whose vertices lie on it."""
     latitude = np.pi * (np.arange(1, rings) / rings - 0.5)
     turn = 2 * np.pi * np.arange(sides) / sides
-    ring = [(np.cos(p) * np.cos(t), np.cos(p) * np.sin(t), np.sin(p)) for p in latitude for t in turn]
+    ring = [
+        (np.cos(p) * np.cos(t), np.cos(p) * np.sin(t), np.sin(p)) for p in latitude for t in turn
+    ]
     vertices = radius * np.array([(0, 0, -1), *ring, (0, 0, 1)])
     top, faces = len(vertices) - 1, []
     for j in range(sides):
@@ -62,7 +64,16 @@ def stl_header(count, text=b"made by a test"):
     return text.ljust(80, b"\0") + count.to_bytes(4, "little")
 
 
-def dae(points="0 0 0 1 0 0 0 1 0", indices="0 1 2", *, unit="1", up="Z_UP", before="", node="", tail="</COLLADA>"):
+def dae(
+    points="0 0 0 1 0 0 0 1 0",
+    indices="0 1 2",
+    *,
+    unit="1",
+    up="Z_UP",
+    before="",
+    node="",
+    tail="</COLLADA>",
+):
     """A COLLADA file of one geometry."""
     return f"""<?xml version="1.0"?>{before}
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">

@@ -106,7 +106,11 @@ def grids(motion, rate=1000.0, points=20):
     rows = []
     for name in ("q", "qd", "qdd"):
         value = getattr(motion, name)
-        rows.append(np.concatenate([value(t), value(inside), value(ends, side="left"), value(motion.duration)[None]]))
+        rows.append(
+            np.concatenate(
+                [value(t), value(inside), value(ends, side="left"), value(motion.duration)[None]]
+            )
+        )
     return rows
 
 
@@ -119,7 +123,9 @@ def worst_excess(arm, motion, limits):
     tau = tau + qdd @ description_of(arm).numbers.coupling
     size = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
     with np.errstate(invalid="ignore"):
-        position = np.maximum(limits.lower - q, q - limits.upper) / np.where(np.isfinite(size), size, 1.0)
+        position = np.maximum(limits.lower - q, q - limits.upper) / np.where(
+            np.isfinite(size), size, 1.0
+        )
     return {
         "position": float(np.max(position)),
         "velocity": float(np.max(np.abs(qd) / limits.velocity) - 1),
@@ -145,7 +151,9 @@ def toppra_duration(arm, start, goal, limits, gridpoints=501):
         return np.ravel(pin.rnea(model, data, *(np.asarray(x, dtype=float) for x in (q, qd, qdd))))
 
     path = toppra.SplineInterpolator([0, 1], np.array([start, goal]))
-    speed = toppra.constraint.JointVelocityConstraint(np.stack([-limits.velocity, limits.velocity], axis=1))
+    speed = toppra.constraint.JointVelocityConstraint(
+        np.stack([-limits.velocity, limits.velocity], axis=1)
+    )
     effort = toppra.constraint.JointTorqueConstraint(
         torque,
         np.stack([-limits.torque, limits.torque], axis=1),

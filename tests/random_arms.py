@@ -18,8 +18,15 @@ length = st.one_of(
 )
 """m"""
 right_angle = st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi])
-near_right_angle = st.builds(lambda side, off: side * np.pi / 2 + off, st.sampled_from([-1, 1]), st.floats(-1e-9, 1e-9))
-angle = st.one_of(right_angle, near_right_angle, st.floats(-np.pi, np.pi), st.sampled_from(["pi/6", "-pi/4", "1e-9"]))
+near_right_angle = st.builds(
+    lambda side, off: side * np.pi / 2 + off, st.sampled_from([-1, 1]), st.floats(-1e-9, 1e-9)
+)
+angle = st.one_of(
+    right_angle,
+    near_right_angle,
+    st.floats(-np.pi, np.pi),
+    st.sampled_from(["pi/6", "-pi/4", "1e-9"]),
+)
 """rad; what makes reading angles back out of matrices hard is drawn often"""
 
 
@@ -45,7 +52,9 @@ def arms(draw: st.DrawFn, least: int = 1, most: int = 7) -> Description:
     """Draw an arm with a body and a drive on every link."""
     arm = draw(tables(least, most))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    joints = tuple(replace(joint, bodies=(random_body(rng),), drive=random_drive(rng)) for joint in arm.joints)
+    joints = tuple(
+        replace(joint, bodies=(random_body(rng),), drive=random_drive(rng)) for joint in arm.joints
+    )
     return replace(arm, joints=joints)
 
 
@@ -58,7 +67,14 @@ def random_body(rng: np.random.Generator) -> Body:
     I = I + 0.01 * np.eye(3)  # noqa: E741
     numbers = {
         key: exact(Fraction(float(I[ij])))
-        for key, ij in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}.items()
+        for key, ij in {
+            "xx": (0, 0),
+            "yy": (1, 1),
+            "zz": (2, 2),
+            "xy": (0, 1),
+            "yz": (1, 2),
+            "xz": (0, 2),
+        }.items()
     }
     return Body(exact(float(masses.sum())), tuple(exact(float(x)) for x in com), Inertia(**numbers))
 
@@ -95,10 +111,18 @@ def elbow_arms(draw):
     flat = draw(st.sampled_from([0.0, np.pi]))
     last = draw(turn)
     if draw(st.booleans()):
-        alpha, a, d = [right[0], flat, *right[1:], last], [a1, a2, a3, 0, 0, draw(shift)], [d1, d2, d3, d4, 0, d6]
+        alpha, a, d = (
+            [right[0], flat, *right[1:], last],
+            [a1, a2, a3, 0, 0, draw(shift)],
+            [d1, d2, d3, d4, 0, d6],
+        )
         arm = from_dh(list(zip(theta, d, a, alpha, strict=True)))
     else:
-        alpha, a, d = [0, right[0], flat, *right[1:]], [0, a1, a2, a3, 0, 0], [d1, d2, d3, d4, 0, d6]
+        alpha, a, d = (
+            [0, right[0], flat, *right[1:]],
+            [0, a1, a2, a3, 0, 0],
+            [d1, d2, d3, d4, 0, d6],
+        )
         arm = from_dh(list(zip(theta, d, a, alpha, strict=True)), convention="modified")
     return draw(placed(arm))
 
@@ -122,14 +146,25 @@ def slide_arms(draw):
     a = [draw(shift), draw(shift), draw(shift), 0, 0, draw(shift)]
     d = [draw(shift), draw(shift), 0, draw(shift), 0, draw(shift)]
     theta = [draw(turn) for _ in range(6)]
-    alpha = [right[0], right[1], draw(st.sampled_from([0.0, np.pi])), right[2], right[3], draw(turn)]
+    alpha = [
+        right[0],
+        right[1],
+        draw(st.sampled_from([0.0, np.pi])),
+        right[2],
+        right[3],
+        draw(turn),
+    ]
     return draw(placed(from_dh(list(zip(theta, d, a, alpha, strict=True)), kinds="RRPRRR")))
 
 
 @st.composite
 def few_joint_arms(draw):
     """Draw a planar arm, a SCARA, a turret, or one with a slide."""
-    kinds = draw(st.sampled_from(["RR", "RRR", "RRPR", "RRRP", "PRRR", "turret2", "turret3", "pan", "RP", "PR"]))
+    kinds = draw(
+        st.sampled_from(
+            ["RR", "RRR", "RRPR", "RRRP", "PRRR", "turret2", "turret3", "pan", "RP", "PR"]
+        )
+    )
     flats = [draw(st.sampled_from([0.0, np.pi])) for _ in range(4)]
     right = draw(signed) * np.pi / 2
     lengths = [draw(signed) * draw(link) for _ in range(4)]
@@ -140,7 +175,10 @@ def few_joint_arms(draw):
         rows = [(theta[i], d[i], a[i], alpha[i]) for i in range(n)]
         return draw(placed(from_dh(rows)))
     if kinds in ("RP", "PR"):
-        rows = [(theta[0], d[0], 0.0 if kinds == "RP" else draw(shift), right), (theta[1], d[1], lengths[1], flats[0])]
+        rows = [
+            (theta[0], d[0], 0.0 if kinds == "RP" else draw(shift), right),
+            (theta[1], d[1], lengths[1], flats[0]),
+        ]
         return draw(placed(from_dh(rows, kinds=kinds)))
     # A slide's length keeps the axes around it apart, or there would be two coincident ones.
     rows = [(theta[i], d[i], lengths[i], flats[i]) for i in range(len(kinds))]

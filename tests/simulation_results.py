@@ -26,7 +26,10 @@ def swinging(description, states=400, error=0.02, seconds=2.0, seed=0, most=None
     rng, n = np.random.default_rng(seed), description.n
     t = np.linspace(0.0, seconds, states) if states > 1 else np.zeros(1)
     phase, rate = rng.uniform(0, 2, n), rng.uniform(1, 3, n)
-    lower, upper = (np.clip(limit, -2.0, 2.0) for limit in (description.numbers.lower, description.numbers.upper))
+    lower, upper = (
+        np.clip(limit, -2.0, 2.0)
+        for limit in (description.numbers.lower, description.numbers.upper)
+    )
     centre, swing = (lower + upper) / 2, 0.35 * (upper - lower)
     angle = phase + rate * t[:, None]
     reference_q, reference_qd = centre + swing * np.sin(angle), rate * swing * np.cos(angle)

@@ -64,7 +64,11 @@ def functions_of_descriptions():
 def test_every_function_of_a_description_takes_an_arm():
     listed = dict(functions_of_descriptions())
     assert len(listed) > 60
-    odd = [name for name, one in listed.items() if not hasattr(one, "takes_robot") and name.split(".")[1] not in WITHIN]
+    odd = [
+        name
+        for name, one in listed.items()
+        if not hasattr(one, "takes_robot") and name.split(".")[1] not in WITHIN
+    ]
     assert odd == []
 
 
@@ -88,7 +92,9 @@ CALLS = {
     "view": lambda arm: View(arm).description.name,
     "casadi": lambda arm: float(symbolic.CasadiFunctions(arm).mass_matrix(Q)[0, 0]),
     "plant": lambda arm: control.Plant(arm).description.name,
-    "trajectory": lambda arm: trajectories.Trajectory(arm, [0, 1], np.zeros((1, 2, 2))).description.name,
+    "trajectory": lambda arm: (
+        trajectories.Trajectory(arm, [0, 1], np.zeros((1, 2, 2))).description.name
+    ),
     "urdf": model.urdf_text,
     "pinocchio": lambda arm: model.pinocchio_model(arm).nq,
     "joint array": lambda arm: description.joint_array(arm, Q),
@@ -96,7 +102,9 @@ CALLS = {
     "DHTable.of": lambda arm: str(description.DHTable.of(arm)),
     "symbolic table": lambda arm: repr(symbolic.SymbolicTable.of(arm)),
     "moving plant": lambda arm: Arm.load("planar2r").simulate(plant=arm, duration=0.01).q,
-    "plants": lambda arm: Arm.load("planar2r").simulate_batch(plant=[arm], duration=0.01).peak_error,
+    "plants": lambda arm: (
+        Arm.load("planar2r").simulate_batch(plant=[arm], duration=0.01).peak_error
+    ),
     "replace": lambda arm: View(Arm.load("puma560")).replace(arm, [0.1, 0.2]) or 0,
     "read_motion": lambda arm: trajectories.read_motion(MOTION, arm).duration,
     "lab": lambda arm: dhkit.lab.Lab(arm).desk.arm.name,
@@ -107,7 +115,9 @@ CALLS = {
 def test_an_arm_and_its_description_give_the_same(name):
     arm = Arm.load("planar2r")
     for_arm = CALLS[name](arm)
-    assert np.array_equal(np.asarray(for_arm), np.asarray(CALLS[name](arm.description if name != "ik" else arm)))
+    assert np.array_equal(
+        np.asarray(for_arm), np.asarray(CALLS[name](arm.description if name != "ik" else arm))
+    )
 
 
 def test_what_is_no_robot_is_said():
@@ -147,13 +157,21 @@ POSITIONS = {
     "require": lambda arm, q: arm.ik(arm.fk("ready")).require(q),
     "ik_chunks": lambda arm, q: next(arm.ik_chunks(arm.fk("ready")[None], seed=q))[1].q,
     "spline": lambda arm, q: arm.spline([q, "ready"]).q(0.2),
-    "straight_line": lambda arm, q: arm.straight_line(arm.fk("nominal"), LINE @ arm.fk("nominal"), q).q(0.1),
+    "straight_line": lambda arm, q: arm.straight_line(
+        arm.fk("nominal"), LINE @ arm.fk("nominal"), q
+    ).q(0.1),
     "circle": lambda arm, q: arm.circle(arm.fk("nominal"), CENTRE, [1, 0, 0], 0.3, q0=q).q(0.1),
     "joint path": lambda arm, q: dhkit.JointPath.straight(arm.description, q, np.zeros(6)).q(0.5),
     "plan": lambda arm, q: arm.plan(q, "ready", intervals=12, compare=False).q(0.1),
-    "plan via": lambda arm, q: arm.plan("zero", "ready", via=[q], intervals=12, compare=False).q(0.3),
-    "compare": lambda arm, q: arm.compare(arm.quintic(q, "ready", 1.0), ("pid",), q0=q, duration=0.01).results["pid"].q,
-    "simulate_batch": lambda arm, q: arm.simulate_batch(q0=q, duration=0.01, friction=False).peak_error,
+    "plan via": lambda arm, q: arm.plan("zero", "ready", via=[q], intervals=12, compare=False).q(
+        0.3
+    ),
+    "compare": lambda arm, q: (
+        arm.compare(arm.quintic(q, "ready", 1.0), ("pid",), q0=q, duration=0.01).results["pid"].q
+    ),
+    "simulate_batch": lambda arm, q: (
+        arm.simulate_batch(q0=q, duration=0.01, friction=False).peak_error
+    ),
     "hold": lambda arm, q: arm.simulate(reference=q, duration=0.01).q,
     "LQR": lambda arm, q: dhkit.LQR(arm, q).K,
     "PID.tuned": lambda arm, q: dhkit.PID.tuned(arm, q=q).kp,
@@ -168,10 +186,16 @@ POSITIONS = {
 @pytest.mark.parametrize("name", POSITIONS)
 def test_joint_values_may_be_a_configurations_name(name):
     arm = Arm.load("puma560")
-    POSITIONS[name](arm, "nominal")  # from here on kernels are compiled, or not, in all calls: both differ by rounding
+    POSITIONS[name](
+        arm, "nominal"
+    )  # from here on kernels are compiled, or not, in all calls: both differ by rounding
     named = POSITIONS[name](arm, "nominal")
-    assert np.array_equal(named, POSITIONS[name](arm, arm.configurations["nominal"]), equal_nan=True)
-    with pytest.raises((ValueError, dhkit.DhkitError), match="puma560 has no configuration 'nomnal'; it has"):
+    assert np.array_equal(
+        named, POSITIONS[name](arm, arm.configurations["nominal"]), equal_nan=True
+    )
+    with pytest.raises(
+        (ValueError, dhkit.DhkitError), match="puma560 has no configuration 'nomnal'; it has"
+    ):
         POSITIONS[name](arm, "nomnal")
 
 
@@ -209,7 +233,10 @@ def test_methods_of_an_arm_have_signatures():
     ],
 )
 def test_a_method_has_the_options_and_defaults_of_its_function(method, function):
-    options, own = inspect.signature(function).parameters, inspect.signature(getattr(Arm, method)).parameters
+    options, own = (
+        inspect.signature(function).parameters,
+        inspect.signature(getattr(Arm, method)).parameters,
+    )
     for name, option in options.items():
         if option.kind is option.KEYWORD_ONLY and name not in ("plant", "compare"):
             assert own[name].default == option.default, name
@@ -259,8 +286,13 @@ def test_a_rubric_decides_how_many_digits_count():
     from dhkit.grading import Rubric
 
     arm = Arm.load("planar2r")
-    loose, strict = (arm.grade(M22="0.333*m2*l2^2", rubric=Rubric(digits=digits)) for digits in (3, 5))
-    assert (loose.verdict.value, strict.verdict.value) == ("incomplete", "wrong")  # right, as far as it goes
+    loose, strict = (
+        arm.grade(M22="0.333*m2*l2^2", rubric=Rubric(digits=digits)) for digits in (3, 5)
+    )
+    assert (loose.verdict.value, strict.verdict.value) == (
+        "incomplete",
+        "wrong",
+    )  # right, as far as it goes
 
 
 def test_what_an_arm_returns_is_exported():
@@ -271,7 +303,9 @@ def test_what_an_arm_returns_is_exported():
     for name, one in inspect.getmembers(Arm):
         function = one.fget if isinstance(one, property) else getattr(one, "func", one)
         if not name.startswith("_") and callable(function) and not inspect.isclass(function):
-            returned |= set(re.findall(r"[A-Z]\w+", str(inspect.signature(function).return_annotation)))
+            returned |= set(
+                re.findall(r"[A-Z]\w+", str(inspect.signature(function).return_annotation))
+            )
     foreign = {"Array", "Iterator", "Mapping", "None", "Path", "PinocchioModel"}
     assert returned - foreign <= set(dhkit.__all__)
     assert all(hasattr(dhkit, name) for name in dhkit.__all__)
@@ -283,14 +317,19 @@ def test_a_robot_where_a_description_or_gains_are_expected_gets_the_cure(tmp_pat
         dhkit.Arm("puma560")
     with pytest.raises(TypeError, match="found a Arm; expected a Description"):
         dhkit.Arm(arm)
-    with pytest.raises(TypeError, match=r"kp is a robot; expected gains, which PID.tuned\(arm\) computes"):
+    with pytest.raises(
+        TypeError, match=r"kp is a robot; expected gains, which PID.tuned\(arm\) computes"
+    ):
         dhkit.PID(arm)
     (tmp_path / "bare.csv").write_text("0,0.1,0.2\n0.1,0.2,0.3\n")
     with pytest.raises(DescriptionError, match="no header: the first line has numbers"):
         dhkit.Trajectory.read(tmp_path / "bare.csv", arm)
     (tmp_path / "degrees.csv").write_text("t,q1,q2\n0,10,20\n0.1,20,30\n0.2,35,40\n")
     dhkit.Trajectory.read(tmp_path / "degrees.csv", arm)
-    assert "were degrees meant?" in caplog.text and "degrees=True (--degrees) reads them" in caplog.text
+    assert (
+        "were degrees meant?" in caplog.text
+        and "degrees=True (--degrees) reads them" in caplog.text
+    )
     caplog.clear()
     dhkit.Trajectory.read(tmp_path / "degrees.csv", arm, degrees=True)
     assert caplog.text == ""

@@ -17,7 +17,12 @@ def test_an_arm_is_a_value(name):
     arm = Arm.load(name)
     assert arm.fk(np.zeros(arm.n)).shape == (4, 4)
     arm.model  # noqa: B018 - what is cached must not get into copies
-    for other in (pickle.loads(pickle.dumps(arm)), copy.copy(arm), copy.deepcopy(arm), Arm(arm.description)):
+    for other in (
+        pickle.loads(pickle.dumps(arm)),
+        copy.copy(arm),
+        copy.deepcopy(arm),
+        Arm(arm.description),
+    ):
         assert other == arm
         assert hash(other) == hash(arm)
         assert np.array_equal(other.fk(np.ones(arm.n)), arm.fk(np.ones(arm.n)))
@@ -30,7 +35,14 @@ def test_ten_threads_may_use_one_arm():
     q = np.random.default_rng(0).uniform(-3, 3, (200, 6))
 
     def work(_):
-        return arm.fk(q), arm.jacobian(q), arm.frames(q), arm.model.nq, str(arm.dh), arm.verify(3).ok
+        return (
+            arm.fk(q),
+            arm.jacobian(q),
+            arm.frames(q),
+            arm.model.nq,
+            str(arm.dh),
+            arm.verify(3).ok,
+        )
 
     with ThreadPoolExecutor(10) as pool:
         results = list(pool.map(work, range(20)))
@@ -67,7 +79,9 @@ def test_the_pinocchio_model_is_one_object_that_nothing_else_uses():
     assert arm.verify(10).ok
     motion = arm.plan([0, 0], [1.0, 0.5], intervals=24)
     assert motion.report.certificate.ok
-    assert np.array_equal(motion.tau(0.1), Arm.load("planar2r").plan([0, 0], [1.0, 0.5], intervals=24).tau(0.1))
+    assert np.array_equal(
+        motion.tau(0.1), Arm.load("planar2r").plan([0, 0], [1.0, 0.5], intervals=24).tau(0.1)
+    )
 
 
 def test_limits_names_and_files(tmp_path):
@@ -76,13 +90,24 @@ def test_limits_names_and_files(tmp_path):
     assert np.array_equal(arm.limits.velocity, arm.description.numbers.velocity)
     slower = arm.with_limits(velocity=0.5, lower=[-1] * 6, upper=np.full(6, 2.0), torque=np.inf)
     assert slower.limits.velocity.tolist() == [0.5] * 6
-    assert (slower.limits.lower[0], slower.limits.upper[5], slower.limits.torque[1]) == (-1, 2, np.inf)
+    assert (slower.limits.lower[0], slower.limits.upper[5], slower.limits.torque[1]) == (
+        -1,
+        2,
+        np.inf,
+    )
     assert slower.description.joints[0].bodies == arm.description.joints[0].bodies
     assert arm.with_limits(lower=-np.inf, upper=np.inf).description.joints[0].limits is None
-    for wrong in ({"lower": 2.0, "upper": 1.0}, {"upper": np.inf}, {"velocity": -1.0}, {"lower": np.nan}):
+    for wrong in (
+        {"lower": 2.0, "upper": 1.0},
+        {"upper": np.inf},
+        {"velocity": -1.0},
+        {"lower": np.nan},
+    ):
         with pytest.raises(dhkit.DhkitError, match=r"joint 1 \(waist\): "):
             arm.with_limits(**wrong)
-    with pytest.raises(ValueError, match=r"velocity has shape \(2,\); expected \(6,\) or one number"):
+    with pytest.raises(
+        ValueError, match=r"velocity has shape \(2,\); expected \(6,\) or one number"
+    ):
         arm.with_limits(velocity=[1, 2])
     files = arm.save(tmp_path / "puma.toml")
     assert files[0] == tmp_path / "puma.toml"
@@ -96,11 +121,17 @@ def test_limits_names_and_files(tmp_path):
 def test_an_arm_without_meshes_is_saved_as_one_file(tmp_path):
     arm = Arm.from_dh([(0, 0.3, 0.5, "pi/2"), (0, 0, 0.4, 0)], name="bare")
     assert arm.save(tmp_path / "new" / "bare.toml") == (tmp_path / "new" / "bare.toml",)
-    assert np.array_equal(Arm.load(tmp_path / "new" / "bare.toml").fk([0.1, 0.2]), arm.fk([0.1, 0.2]))
+    assert np.array_equal(
+        Arm.load(tmp_path / "new" / "bare.toml").fk([0.1, 0.2]), arm.fk([0.1, 0.2])
+    )
 
 
 def test_a_table_may_have_limits_and_bodies():
-    rod = {"mass": "m", "com": ("-l/2", 0, 0), "inertia": ((0, 0, 0), (0, "m*l^2/12", 0), (0, 0, "m*l^2/12"))}
+    rod = {
+        "mass": "m",
+        "com": ("-l/2", 0, 0),
+        "inertia": ((0, 0, 0), (0, "m*l^2/12", 0), (0, 0, "m*l^2/12")),
+    }
     arm = Arm.from_dh(
         [(0, 0, "l", 0), (0, 0, 0.3, 0)],
         angle="deg",
@@ -118,7 +149,10 @@ def test_a_table_may_have_limits_and_bodies():
         ({"bodies": [3, None]}, "body of link 1: found 3; expected a Body"),
         ({"bodies": [{"mass": 1, "moi": 2}, None]}, "body of link 1"),
         ({"bodies": [{"mass": 1, "com": (0, 0)}, None]}, "com has 2 numbers"),
-        ({"bodies": [{"mass": 1, "inertia": ((1, 2, 0), (0, 1, 0), (0, 0, 1))}, None]}, "symmetric 3x3"),
+        (
+            {"bodies": [{"mass": 1, "inertia": ((1, 2, 0), (0, 1, 0), (0, 0, 1))}, None]},
+            "symmetric 3x3",
+        ),
         (
             {"bodies": [{"mass": 1, "inertia": {"x": 1}}, None]},
             "found x; expected a symmetric 3x3 matrix",
@@ -147,15 +181,26 @@ def test_new_arms_leave_the_old_one_alone():
     arm = Arm.load("planar3r")
     before = pickle.dumps(arm)
     assert arm.lock({0: 0.1}).n == 2
-    assert arm.with_payload(1.0, (0.1, 0, 0)).description.numbers.mass[2] > arm.description.numbers.mass[2]
+    assert (
+        arm.with_payload(1.0, (0.1, 0, 0)).description.numbers.mass[2]
+        > arm.description.numbers.mass[2]
+    )
     assert arm.with_parameters(l1=2).description.numbers.a[0] == 2
     assert arm.with_uniform_links([1, 2, 3]).description.numbers.mass.tolist() == [1, 2, 3]
-    assert arm.with_base(dhkit.pose((1, 0, 0))).fk(np.zeros(3))[0, 3] == arm.fk(np.zeros(3))[0, 3] + 1
+    assert (
+        arm.with_base(dhkit.pose((1, 0, 0))).fk(np.zeros(3))[0, 3] == arm.fk(np.zeros(3))[0, 3] + 1
+    )
     assert pickle.dumps(arm) == before
     assert repr(arm) == "<Arm planar3r: RRR, standard DH>"
-    held = Arm.load("puma560").with_payload(2.0).with_payload(0.5).with_tool(dhkit.pose((0, 0, 0.1)))
-    assert repr(held) == "<Arm puma560: RRRRRR, standard DH, tool at (0, 0, 0.1) m, carrying 2.5 kg>"
-    assert "carrying 2.5 kg" in held._repr_html_() and "l1 = 0.5" in Arm.load("planar2r")._repr_html_()
+    held = (
+        Arm.load("puma560").with_payload(2.0).with_payload(0.5).with_tool(dhkit.pose((0, 0, 0.1)))
+    )
+    assert (
+        repr(held) == "<Arm puma560: RRRRRR, standard DH, tool at (0, 0, 0.1) m, carrying 2.5 kg>"
+    )
+    assert (
+        "carrying 2.5 kg" in held._repr_html_() and "l1 = 0.5" in Arm.load("planar2r")._repr_html_()
+    )
     assert "<table>" in arm._repr_html_()
     assert arm.urdf().startswith("<?xml")
     assert arm.jacobian_dot(np.zeros(3), np.ones(3), frame="tool").shape == (6, 3)
@@ -179,6 +224,10 @@ def test_the_public_names_are_there():
 
 def test_inertias_are_given_as_robot_files_give_them():
     def arm(inertia):
-        return Arm.from_dh([(0, 0, 0.4, 0)], kinds="R", name="rod", bodies=[{"mass": 1, "inertia": inertia}])
+        return Arm.from_dh(
+            [(0, 0, 0.4, 0)], kinds="R", name="rod", bodies=[{"mass": 1, "inertia": inertia}]
+        )
 
-    assert arm({"xx": 0.01, "yy": 0.02, "xy": 0.001}) == arm([[0.01, 0.001, 0], [0.001, 0.02, 0], [0, 0, 0]])
+    assert arm({"xx": 0.01, "yy": 0.02, "xy": 0.001}) == arm(
+        [[0.01, 0.001, 0], [0.001, 0.02, 0], [0, 0, 0]]
+    )

@@ -51,7 +51,9 @@ for call in (lambda: arm.model, lambda: arm.verify(1)):
 
 
 def run(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False
+    )
 
 
 def test_importing_dhkit_imports_nothing_heavy():

@@ -56,7 +56,9 @@ def test_a_run_is_the_same_by_options_and_by_keywords():
 def test_a_motion_is_the_same_by_options_and_by_keywords():
     limits = dhkit.Limits.of(ARM.description, acceleration=5.0)
     options = PlanOptions(limits=limits, start_velocity=[0.1, 0.0])
-    one = ARM.plan([0, 0], [0.5, 0.3], intervals=12, limits=limits, start_velocity=[0.1, 0.0], compare=False)
+    one = ARM.plan(
+        [0, 0], [0.5, 0.3], intervals=12, limits=limits, start_velocity=[0.1, 0.0], compare=False
+    )
     other = ARM.plan([0, 0], [0.5, 0.3], intervals=12, options=options)
     assert one.duration == other.duration and other.report.coarse is None
     path = dhkit.trajectories.JointPath.straight(ARM.description, [0.0, 0.0], [0.5, 0.3])

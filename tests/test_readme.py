@@ -16,7 +16,9 @@ COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", README, re.MULTILINE)
 FILES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize("command", [slow_if(x.startswith(("bench", "compare", "demo")), x) for x in COMMANDS])
+@pytest.mark.parametrize(
+    "command", [slow_if(x.startswith(("bench", "compare", "demo")), x) for x in COMMANDS]
+)
 def test_a_command_of_the_readme_works(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("webbrowser.open", lambda url: True)
@@ -59,7 +61,16 @@ def test_the_documents_that_the_readme_names_are_there():
 def test_nothing_installs_the_strangers_package():
     """The name dhkit belongs to somebody else on PyPI."""
     root = Path(__file__).parents[1]
-    texts = [root / "README.md", *root.glob("docs/**/*.md"), *root.glob("src/dhkit/**/*.py"), root / "CONTRIBUTING.md"]
-    found = [path.name for path in texts if re.search(r"pip3? install ['\"]?dhkit(?!-robotics)", path.read_text())]
+    texts = [
+        root / "README.md",
+        *root.glob("docs/**/*.md"),
+        *root.glob("src/dhkit/**/*.py"),
+        root / "CONTRIBUTING.md",
+    ]
+    found = [
+        path.name
+        for path in texts
+        if re.search(r"pip3? install ['\"]?dhkit(?!-robotics)", path.read_text())
+    ]
     assert found == []
     assert 'name = "dhkit-robotics"' in (root / "pyproject.toml").read_text()

@@ -155,7 +155,10 @@ def runs():
 
 @cache
 def comparison():
-    pids = {name: dhkit.PID.tuned(planar(), bandwidth) for name, bandwidth in (("slow", 5.0), (HOSTILE, 20.0))}
+    pids = {
+        name: dhkit.PID.tuned(planar(), bandwidth)
+        for name, bandwidth in (("slow", 5.0), (HOSTILE, 20.0))
+    }
     return planar().compare(quintic(), pids, duration=0.02)
 
 
@@ -166,7 +169,9 @@ def grade():
 
 def hostile_grade():
     wrong = [
-        grading.Entry("M", (0, k), grading.Verdict.WRONG, HOSTILE, statement=HOSTILE, difference=HOSTILE)
+        grading.Entry(
+            "M", (0, k), grading.Verdict.WRONG, HOSTILE, statement=HOSTILE, difference=HOSTILE
+        )
         for k in range(40)
     ]
     found = grading.Diagnosis(None, HOSTILE, "M", tuple(one.name for one in wrong), HOSTILE)
@@ -203,15 +208,22 @@ def hostile_step():
 
 @cache
 def check():
-    parts = programs.Part("closes", 55.5, 60.0, "closes 925 of 1000 poses"), programs.Part("time", 10, 10, HOSTILE)
+    parts = (
+        programs.Part("closes", 55.5, 60.0, "closes 925 of 1000 poses"),
+        programs.Part("time", 10, 10, HOSTILE),
+    )
     return programs.CheckReport("puma560", HOSTILE, {"ik": parts}, (HOSTILE,) * 9, 7)
 
 
 @cache
 def verification():
-    fine = tuple(Agreement(f"quantity {k}", 1e-15, 1e-9, (1 / 3,) * 7, (0.2,) * 7) for k in range(30))
+    fine = tuple(
+        Agreement(f"quantity {k}", 1e-15, 1e-9, (1 / 3,) * 7, (0.2,) * 7) for k in range(30)
+    )
     worst = Agreement("C qd", float("nan"), 1e-9, (1 / 3,) * 7)
-    return VerificationReport("puma560", f"Pinocchio {HOSTILE}", 1000, 0, (*fine, worst), (HOSTILE,) * 9)
+    return VerificationReport(
+        "puma560", f"Pinocchio {HOSTILE}", 1000, 0, (*fine, worst), (HOSTILE,) * 9
+    )
 
 
 @cache
@@ -226,7 +238,20 @@ def machine():
 
 def row(contender, own, seconds):
     verdict = bench.Verdict(1.2345678901234567e-16, 7.999)
-    return bench.Row("fk", contender, bench.Mode.BATCH, own, 1000, 9, seconds, seconds, seconds, verdict, 1.0, 0.01)
+    return bench.Row(
+        "fk",
+        contender,
+        bench.Mode.BATCH,
+        own,
+        1000,
+        9,
+        seconds,
+        seconds,
+        seconds,
+        verdict,
+        1.0,
+        0.01,
+    )
 
 
 @cache
@@ -259,7 +284,9 @@ def timed_motions():
 @cache
 def timed_simulation():
     batch = BatchRow(HOSTILE, 1000, Timing(1e-6, 9e-7, 2e-6), 1.0, None)
-    return SimulationReport("puma560", 0, 9, (), (batch,) * 20, (), (), timed().requirements, (), machine())
+    return SimulationReport(
+        "puma560", 0, 9, (), (batch,) * 20, (), (), timed().requirements, (), machine()
+    )
 
 
 def long_sum():
@@ -272,8 +299,12 @@ VALUES = {
     dhkit.View: lambda: dhkit.View(planar().description),
     # bench
     bench.BenchReport: timed,
-    bench.Contender: lambda: bench.Contender("dhkit fk", "fk", bench.Mode.BATCH, lambda workload: None),
-    bench.Derivation: lambda: bench.Derivation("puma560", "dhkit, CasADi functions, all of them", 1 / 3, 60.0),
+    bench.Contender: lambda: bench.Contender(
+        "dhkit fk", "fk", bench.Mode.BATCH, lambda workload: None
+    ),
+    bench.Derivation: lambda: bench.Derivation(
+        "puma560", "dhkit, CasADi functions, all of them", 1 / 3, 60.0
+    ),
     bench.FirstCall: lambda: timed().starts[0],
     bench.Machine: machine,
     bench.Missing: lambda: timed().missing[0],
@@ -296,7 +327,9 @@ VALUES = {
     control.EnergyAudit: lambda: run().audit,
     control.ErrorNorms: lambda: run().tool_norms,
     control.FeedForward: lambda: control.FeedForward.tuned(puma()),
-    control.FrictionCompensation: lambda: control.FrictionCompensation(control.PDGravity.tuned(puma())),
+    control.FrictionCompensation: lambda: control.FrictionCompensation(
+        control.PDGravity.tuned(puma())
+    ),
     control.Held: lambda: control.Held(np.arange(6.0) / 3),
     control.LQR: lambda: control.LQR(planar(), np.zeros(2)),
     control.OperationalSpace: lambda: control.OperationalSpace.tuned(planar()),
@@ -311,7 +344,9 @@ VALUES = {
     control.SimulationResult: run,
     control.Sine: lambda: control.Sine(np.zeros(7), np.full(7, 1 / 3)),
     control.Step: lambda: control.Step(np.zeros(7), np.full(7, 1 / 3), time=0.5),
-    control.ToolPoses: lambda: control.ToolPoses(planar(), [[0.6, 0.3, 0], [0.3, 0.6, 0]], [0.0, 1.0], [0.1, 0.9]),
+    control.ToolPoses: lambda: control.ToolPoses(
+        planar(), [[0.6, 0.3, 0], [0.3, 0.6, 0]], [0.0, 1.0], [0.1, 0.9]
+    ),
     History: lambda: runs().history,
     # description
     description.Base: lambda: puma().description.base,
@@ -346,7 +381,9 @@ VALUES = {
     grading.Entry: lambda: grade().entries[1],
     grading.GradeOptions: lambda: grading.GradeOptions(seed=3, explain=False),
     grading.GradeReport: grade,
-    grading.Mark: lambda: grading.Mark("g2", 0.0, 100 / 3, "wrong by a mistake that has a long name " * 5),
+    grading.Mark: lambda: grading.Mark(
+        "g2", 0.0, 100 / 3, "wrong by a mistake that has a long name " * 5
+    ),
     grading.Marks: lambda: grading.marks(grade(), grading.Rubric()),
     grading.Note: lambda: grading.Note(grading.NoteKind.AGREES, "C", ("M", "g")),
     grading.Rubric: lambda: grading.Rubric(weights={f"A{k}": 1.0 for k in range(1, 90)}),
@@ -371,28 +408,44 @@ VALUES = {
     Step: lambda: assignment().steps[0],
     ToolAt: lambda: ToolAt(pose(), True, 0.01, 0.1),
     # model
-    model.CadImport: lambda: model.CadImport(planar().description, dict.fromkeys(range(30), mesh()), (HOSTILE,) * 9),
-    model.ExampleChain: lambda: model.ExampleChain("example:ur5", Path("ur5.urdf"), None, "tool0", ("a",) * 6),
+    model.CadImport: lambda: model.CadImport(
+        planar().description, dict.fromkeys(range(30), mesh()), (HOSTILE,) * 9
+    ),
+    model.ExampleChain: lambda: model.ExampleChain(
+        "example:ur5", Path("ur5.urdf"), None, "tool0", ("a",) * 6
+    ),
     model.Extraction: extraction,
     model.MassProperties: lambda: mass().moved(np.eye(4)),
     model.Part: lambda: model.link_parts(planar().description)[0],
     model.ReportedMass: lambda: model.ReportedMass(HOSTILE, mass(), (), "report.txt, line 3"),
-    model.Residual: lambda: model.Residual(1.2345678901234e-16, 2.3456789012345e-16, 3.4567890123456e-16, 100),
+    model.Residual: lambda: model.Residual(
+        1.2345678901234e-16, 2.3456789012345e-16, 3.4567890123456e-16, 100
+    ),
     model.ShapeInertia: mass,
     model.TriangleMesh: mesh,
     # planning
-    planning.BranchReport: lambda: planning.BranchReport("right up flip", float("inf"), False, reason=HOSTILE),
+    planning.BranchReport: lambda: planning.BranchReport(
+        "right up flip", float("inf"), False, reason=HOSTILE
+    ),
     planning.Certificate: lambda: plan().certificate,
     planning.Constraint: lambda: planning.ToolSpeed(0.5),
-    planning.Distances: lambda: planar().distance([0.0, 0.0], [planning.Obstacle.sphere(0.1, (0.4, 0.2, 0.9))]),
+    planning.Distances: lambda: planar().distance(
+        [0.0, 0.0], [planning.Obstacle.sphere(0.1, (0.4, 0.2, 0.9))]
+    ),
     planning.Effort: planning.Effort,
-    planning.Energy: lambda: planning.Energy(motor_constants=tuple(np.linspace(0.1, 0.3, 7).tolist())),
+    planning.Energy: lambda: planning.Energy(
+        motor_constants=tuple(np.linspace(0.1, 0.3, 7).tolist())
+    ),
     planning.Floor: lambda: planning.Floor(-0.1, HOSTILE),
     planning.Jerk: planning.Jerk,
     planning.MotorPower: lambda: planning.MotorPower(tuple(np.linspace(100, 300, 7) / 3)),
-    planning.Objective: lambda: planning.Time() + 0.01 * planning.Effort() + planning.Jerk() + planning.Energy(),
+    planning.Objective: lambda: (
+        planning.Time() + 0.01 * planning.Effort() + planning.Jerk() + planning.Energy()
+    ),
     planning.Obstacle: lambda: planning.Obstacle.box((0.1, 0.2, 0.3), pose(), HOSTILE),
-    planning.PathOptions: lambda: planning.PathOptions(obstacles=[planning.Obstacle.sphere(0.1, (1, 1, 1))] * 20),
+    planning.PathOptions: lambda: planning.PathOptions(
+        obstacles=[planning.Obstacle.sphere(0.1, (1, 1, 1))] * 20
+    ),
     planning.PlanOptions: lambda: planning.PlanOptions(via=[[0.1, 0.2]] * 20, clearance=0.02),
     planning.PlanReport: plan,
     planning.Planner: lambda: planar().planner(),
@@ -426,7 +479,9 @@ VALUES = {
     symbolic.Mistake: lambda: next(iter(symbolic.MISTAKES.values())),
     symbolic.Moments: lambda: symbolic.InertialTable.of(planar().description).links[0],
     symbolic.Node: lambda: graph().nodes[-1],
-    symbolic.Proof: lambda: symbolic.Proof(HOSTILE, np.array([planar().lagrangian.K], dtype=object)),
+    symbolic.Proof: lambda: symbolic.Proof(
+        HOSTILE, np.array([planar().lagrangian.K], dtype=object)
+    ),
     symbolic.Regressor: lambda: regressor(planar().derive("inertial")),
     symbolic.SymbolicKinematics: lambda: planar().symbolic,
     symbolic.SymbolicMatrix: lambda: planar().symbolic.T,
@@ -452,7 +507,9 @@ VALUES = {
 VARIANTS = {
     "arm of 32 joints": long_arm,
     "limits of 32 joints": lambda: long_arm().limits,
-    "samples of 32 joints": lambda: long_arm().quintic(np.zeros(32), np.ones(32), duration=1.0).sample(n=50),
+    "samples of 32 joints": lambda: (
+        long_arm().quintic(np.zeros(32), np.ones(32), duration=1.0).sample(n=50)
+    ),
     "100,000 poses": lambda: poses(MANY),
     "poses in a grid": lambda: poses(2, 3),
     "no poses": lambda: poses(0),
@@ -460,7 +517,9 @@ VARIANTS = {
     "no pose": lambda: puma().ik(np.full((4, 4), np.nan)),
     "singular pose": lambda: puma().ik(puma().fk(np.zeros(6))),
     "numeric solution": lambda: puma().ik_numeric(pose()),
-    "hostile branches": lambda: replace(solutions(), branches=tuple(f"{k} {HOSTILE}" for k in range(8))),
+    "hostile branches": lambda: replace(
+        solutions(), branches=tuple(f"{k} {HOSTILE}" for k in range(8))
+    ),
     "path of 100,000 poses, lost": lambda: kinematics.IKPath(
         np.zeros((MANY, 6)), (HOSTILE,) * MANY, (5,), tuple(range(MANY)), 0.0, tuple(range(MANY))
     ),
@@ -472,7 +531,9 @@ VARIANTS = {
     "hostile entry": lambda: hostile_grade().entries[0],
     "hostile diagnosis": lambda: hostile_grade().diagnosis[0],
     "hostile note": lambda: grading.Note(grading.NoteKind.PROGRAM, HOSTILE, (HOSTILE,)),
-    "hostile marks": lambda: grading.Marks(0.0, 10.0, (), (grading.Mark(HOSTILE, 0.0, 1.0, HOSTILE),) * 40),
+    "hostile marks": lambda: grading.Marks(
+        0.0, 10.0, (), (grading.Mark(HOSTILE, 0.0, 1.0, HOSTILE),) * 40
+    ),
     "unreadable sheet": lambda: grading.GradeReport(sheet=HOSTILE, error=HOSTILE),
     "empty sheet": grading.GradeReport,
     "hostile assignment": lambda: lab.Assignment(HOSTILE, planar(), None, None, (hostile_step(),)),
@@ -497,7 +558,9 @@ VARIANTS = {
     "long equations": lambda: puma().lagrangian,
     "long element": lambda: puma().lagrangian.M[0, 0],
     "long matrix": lambda: puma().symbolic.J,
-    "more base parameters": lambda: symbolic.base_parameters(dhkit.Arm.load("planar3r").description),
+    "more base parameters": lambda: symbolic.base_parameters(
+        dhkit.Arm.load("planar3r").description
+    ),
 }
 """The same classes at their edges: batches, nothing at all, and texts that are not meant well."""
 
@@ -508,7 +571,11 @@ def value(key):
 
 
 def named(key):
-    return key if isinstance(key, str) else f"{key.__module__.removeprefix('dhkit.')}.{key.__qualname__}"
+    return (
+        key
+        if isinstance(key, str)
+        else f"{key.__module__.removeprefix('dhkit.')}.{key.__qualname__}"
+    )
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -551,7 +618,9 @@ def test_a_repr_is_one_short_line(key):
 MARKUP = {"body", "div", "b", "table", "caption", "thead", "tbody", "tr", "th", "td", "ul", "li"}
 
 
-@pytest.mark.parametrize("key", [key for key in [*VALUES, *VARIANTS] if key is not dhkit.View], ids=named)
+@pytest.mark.parametrize(
+    "key", [key for key in [*VALUES, *VARIANTS] if key is not dhkit.View], ids=named
+)
 def test_what_a_notebook_shows_is_small_well_formed_and_escaped(key):
     found = value(key)  # but a view, which shows a page
     assert len(getattr(found, "_repr_latex_", str)() or "") < LARGEST
@@ -560,7 +629,9 @@ def test_what_a_notebook_shows_is_small_well_formed_and_escaped(key):
     root = ET.fromstring(f"<body>{html}</body>")
     assert {node.tag for node in root.iter()} <= MARKUP
     assert "".join(root.itertext()).isprintable()
-    attributes = {value for node in root.iter() for key, value in node.attrib.items() if key != "colspan"}
+    attributes = {
+        value for node in root.iter() for key, value in node.attrib.items() if key != "colspan"
+    }
     assert attributes <= {"text-align:left", "text-align:right", "mathjax_ignore tex2jax_ignore"}
     assert all(len(table.findall("tbody/tr")) <= 33 for table in root.iter("table"))
 
@@ -614,7 +685,9 @@ def test_solutions_show_their_branches_in_degrees():
     headings, *rows = cells(found._repr_html_())
     assert headings == ["branch", *(f"q{i} [°]" for i in range(1, 7)), "limits", "special"]
     assert [row[0] for row in rows] == list(found.branches)
-    assert np.allclose([[float(x) for x in row[1:7]] for row in rows], np.degrees(found.q), rtol=0, atol=0.00501)
+    assert np.allclose(
+        [[float(x) for x in row[1:7]] for row in rows], np.degrees(found.q), rtol=0, atol=0.00501
+    )
     assert [row[7] == "inside" for row in rows] == found.allowed.tolist()
 
 
@@ -629,9 +702,15 @@ def test_solutions_of_arms_that_slide_show_metres():
 
 def test_branches_that_do_not_reach_have_no_numbers():
     arm = dhkit.Arm.load("irb140")
-    found = arm.ik(arm.fk([0, 1.5, -1.4, 0, 0.5, 0]))  # far in front: beyond reach for an arm that leans back over
+    found = arm.ik(
+        arm.fk([0, 1.5, -1.4, 0, 0.5, 0])
+    )  # far in front: beyond reach for an arm that leans back over
     assert 0 < found.valid.sum() < len(found)
-    rows = [row for row, reached in zip(cells(found._repr_html_())[1:], found.valid, strict=True) if not reached]
+    rows = [
+        row
+        for row, reached in zip(cells(found._repr_html_())[1:], found.valid, strict=True)
+        if not reached
+    ]
     assert {row[1] for row in rows} == {"–"} and {row[-1] for row in rows} == {"not reached"}
     assert "<table>" not in value("pose out of reach")._repr_html_()
 
@@ -658,7 +737,9 @@ def test_poses_of_a_path_share_a_line_where_the_same_is_to_be_said():
 
 
 def test_a_grade_shows_what_is_wrong_first():
-    rows = cells(planar().grade(g=["(m1/2 + m2)*g*l1*c1 + m2*g*l2*c12/2", "m2*g*l2*c2/2"])._repr_html_())
+    rows = cells(
+        planar().grade(g=["(m1/2 + m2)*g*l1*c1 + m2*g*l2*c12/2", "m2*g*l2*c2/2"])._repr_html_()
+    )
     assert [row[:2] for row in rows[1:]] == [["g2", "wrong"], ["g1", "correct"]]
 
 

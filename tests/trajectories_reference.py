@@ -13,7 +13,9 @@ def random_motion(arm, pieces=4, degree=5, seed=0, duration=2.0):
     """Return a motion whose values jump at its breaks."""
     rng = np.random.default_rng(seed)
     breaks = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, pieces))])
-    return Trajectory(arm, duration * breaks / breaks[-1], rng.uniform(-1, 1, (pieces, degree + 1, arm.n)))
+    return Trajectory(
+        arm, duration * breaks / breaks[-1], rng.uniform(-1, 1, (pieces, degree + 1, arm.n))
+    )
 
 
 def continuous_motion(arm, pieces=4, degree=5, seed=0, duration=2.0):
@@ -34,6 +36,8 @@ def reference_torques(arm):
 
     def torques(q, qd, qdd):
         rows = zip(*(np.reshape(x, (-1, arm.n)) for x in (q, qd, qdd)), strict=True)
-        return np.array([np.array(pin.rnea(model, data, *row)) for row in rows]).reshape(np.shape(q))
+        return np.array([np.array(pin.rnea(model, data, *row)) for row in rows]).reshape(
+            np.shape(q)
+        )
 
     return torques

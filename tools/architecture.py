@@ -112,8 +112,12 @@ def faults() -> Iterator[str]:
 
 def main() -> int:
     """Print the faults, or the figures of density."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--density", action="store_true", help="print figures by package; no figure is a fault")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--density", action="store_true", help="print figures by package; no figure is a fault"
+    )
     if parser.parse_args().density:
         print(density_table(PACKAGE))
         return 0

@@ -47,7 +47,9 @@ class Density:
     nested: int = 0
 
     def __add__(self, other: "Density") -> "Density":
-        sums = {one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)}
+        sums = {
+            one.name: getattr(self, one.name) + getattr(other, one.name) for one in fields(self)
+        }
         return Density(**sums)
 
     def row(self, package: str) -> tuple[str, ...]:
@@ -81,7 +83,9 @@ def density(text: str) -> Density:
     for node in ast.walk(tree):
         if isinstance(node, ast.Assign):
             found.assignments += 1
-            found.multiple += isinstance(node.targets[0], ast.Tuple) and isinstance(node.value, ast.Tuple)
+            found.multiple += isinstance(node.targets[0], ast.Tuple) and isinstance(
+                node.value, ast.Tuple
+            )
         elif isinstance(node, COMPREHENSIONS):
             found.comprehensions += 1
             found.nested += is_nested(node)

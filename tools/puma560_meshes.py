@@ -77,17 +77,35 @@ def write_puma560_meshes(folder: Path) -> list[Path]:
 
 def _base() -> Manifold:
     """Return link 0: a bolted foot, a flared column and the connector box behind it; frame 0, z up from the floor."""
-    foot = _revolve([(0.160, 0.0), (0.160, 0.020), (0.155, 0.025), (0.118, 0.025), (0.103, 0.060), (0.095, 0.085)])
+    foot = _revolve(
+        [
+            (0.160, 0.0),
+            (0.160, 0.020),
+            (0.155, 0.025),
+            (0.118, 0.025),
+            (0.103, 0.060),
+            (0.095, 0.085),
+        ]
+    )
     column = _revolve([(0.095, 0.080), (0.095, 0.535), (0.090, 0.540)])
-    box = _plate([(z, x, 0.012) for z in (0.075, 0.185) for x in (-0.128, -0.060)], -0.062, 0.062, 0.006, "y")
-    duct = _plate([(z, x, 0.012) for z in (0.100, 0.440) for x in (-0.100, -0.060)], -0.024, 0.024, 0.006, "y")
-    bolts = _copies_around_z(_revolve([(0.011, 0.020), (0.011, 0.034)], SMALL_SIDES), radius=0.139, count=4)
+    box = _plate(
+        [(z, x, 0.012) for z in (0.075, 0.185) for x in (-0.128, -0.060)], -0.062, 0.062, 0.006, "y"
+    )
+    duct = _plate(
+        [(z, x, 0.012) for z in (0.100, 0.440) for x in (-0.100, -0.060)], -0.024, 0.024, 0.006, "y"
+    )
+    bolts = _copies_around_z(
+        _revolve([(0.011, 0.020), (0.011, 0.034)], SMALL_SIDES), radius=0.139, count=4
+    )
     return foot + column + box + duct + bolts
 
 
 def _shoulder() -> Manifold:
     """Return link 1: a collar on the column and a horizontal barrel with a cap; frame 1, y up, z along the barrel."""
-    collar = _revolve([(0.082, -0.150), (0.082, -0.122), (0.095, -0.122), (0.095, -0.080), (0.085, -0.030)], axis="y")
+    collar = _revolve(
+        [(0.082, -0.150), (0.082, -0.122), (0.095, -0.122), (0.095, -0.080), (0.085, -0.030)],
+        axis="y",
+    )
     barrel = _revolve([(0.086, -0.142), (0.098, -0.130), (0.098, 0.182), (0.092, 0.188)])
     cap = _revolve([(0.068, -0.156), (0.072, -0.152), (0.072, -0.130)])
     return collar + barrel + cap - _revolve([(0.054, -0.160), (0.054, -0.148)])
@@ -109,7 +127,9 @@ def _forearm() -> Manifold:
     """Return link 3: a slab with a small tail, tapering from elbow to wrist; frame 3, z to the wrist, y inward."""
     profile = [(-0.055, ELBOW_SETBACK, 0.050), (0.0, ELBOW_SETBACK, 0.078), (0.275, 0.0, 0.046)]
     slab = _plate(profile, -0.040, 0.044, 0.008, "y")
-    hub = _revolve([(0.060, -0.060), (0.060, 0.046), (0.056, 0.050)], axis="y", at=(ELBOW_SETBACK, 0.0, 0.0))
+    hub = _revolve(
+        [(0.060, -0.060), (0.060, 0.046), (0.056, 0.050)], axis="y", at=(ELBOW_SETBACK, 0.0, 0.0)
+    )
     nose = _revolve([(0.041, 0.240), (0.041, 0.330), (0.038, 0.333)])
     return slab + hub + nose
 
@@ -118,8 +138,12 @@ def _wrist_roll() -> Manifold:
     """Return link 4: the roll cylinder, forked for the pitch axis; frame 4, y along the forearm, z the pitch axis."""
     neck = _revolve([(0.030, -0.115), (0.030, -0.090)], axis="y")
     cylinder = _revolve([(0.037, -0.095), (0.040, -0.092), (0.040, 0.040)], axis="y")
-    rounded = _plate([(-0.020, -0.095, 0.028), (0.020, -0.095, 0.028), (0.0, 0.0, 0.032)], -0.050, 0.050, 0.0)
-    slot = _plate([(x, y, 0.001) for x in (-0.060, 0.060) for y in (-0.040, 0.060)], -0.0265, 0.0265, 0.0)
+    rounded = _plate(
+        [(-0.020, -0.095, 0.028), (0.020, -0.095, 0.028), (0.0, 0.0, 0.032)], -0.050, 0.050, 0.0
+    )
+    slot = _plate(
+        [(x, y, 0.001) for x in (-0.060, 0.060) for y in (-0.040, 0.060)], -0.0265, 0.0265, 0.0
+    )
     return neck + (cylinder ^ rounded) - slot
 
 
@@ -127,15 +151,21 @@ def _wrist_pitch() -> Manifold:
     """Return link 5: the ball in the fork with its trunnions and the neck; frame 5, y the pitch axis, z to the tool."""
     # A sphere of 35 mm, cut flat where the fork's cheeks pass.
     latitude = np.linspace(-BALL_EDGE, BALL_EDGE, 7)
-    ball = _revolve([(0.035 * np.cos(angle), 0.035 * np.sin(angle)) for angle in latitude], axis="y")
-    trunnion = _revolve([(0.014, -0.0435), (0.016, -0.0415), (0.016, 0.0415), (0.014, 0.0435)], axis="y")
+    ball = _revolve(
+        [(0.035 * np.cos(angle), 0.035 * np.sin(angle)) for angle in latitude], axis="y"
+    )
+    trunnion = _revolve(
+        [(0.014, -0.0435), (0.016, -0.0415), (0.016, 0.0415), (0.014, 0.0435)], axis="y"
+    )
     return ball + trunnion + _revolve([(0.024, 0.0), (0.024, 0.040)])
 
 
 def _flange() -> Manifold:
     """Return link 6: the tool flange with its pilot bore and four bolt holes; frame 6, z out of the flange."""
     spigot = _revolve([(0.018, 0.028), (0.018, 0.044)])
-    disc = _revolve([(0.030, 0.042), (0.0315, 0.0435), (0.0315, FLANGE_FACE - 0.0015), (0.030, FLANGE_FACE)])
+    disc = _revolve(
+        [(0.030, 0.042), (0.0315, 0.0435), (0.0315, FLANGE_FACE - 0.0015), (0.030, FLANGE_FACE)]
+    )
     bore = _revolve([(0.010, FLANGE_FACE - 0.006), (0.010, FLANGE_FACE + 0.010)])
     hole = _revolve([(0.0035, FLANGE_FACE - 0.008), (0.0035, FLANGE_FACE + 0.010)], SMALL_SIDES)
     return spigot + disc - bore - _copies_around_z(hole, radius=0.021, count=4)
@@ -153,7 +183,9 @@ def _outline(discs: Sequence[Disc], inset: float = 0.0, sides: int = SIDES) -> A
     return outline
 
 
-def _loft(sections: Sequence[tuple[Array, float]], axis: Axis = "z", at: Sequence[float] = (0, 0, 0)) -> Manifold:
+def _loft(
+    sections: Sequence[tuple[Array, float]], axis: Axis = "z", at: Sequence[float] = (0, 0, 0)
+) -> Manifold:
     """Return the solid between convex outlines, shape (sides, 2), at increasing heights along an axis through `at`, m.
 
     (u, v) of an outline is (x, y) along z, (y, z) along x and (z, x) along y.
@@ -183,13 +215,22 @@ def _walls(sides: int, levels: int) -> list[tuple[int, int, int]]:
 
 
 def _revolve(
-    profile: Sequence[tuple[float, float]], sides: int = SIDES, axis: Axis = "z", at: Sequence[float] = (0, 0, 0)
+    profile: Sequence[tuple[float, float]],
+    sides: int = SIDES,
+    axis: Axis = "z",
+    at: Sequence[float] = (0, 0, 0),
 ) -> Manifold:
     """Return the solid of revolution about an axis through `at`, from (radius, height) pairs, the lowest first, m."""
-    return _loft([(_outline([(0.0, 0.0, radius)], sides=sides), height) for radius, height in profile], axis, at)
+    return _loft(
+        [(_outline([(0.0, 0.0, radius)], sides=sides), height) for radius, height in profile],
+        axis,
+        at,
+    )
 
 
-def _plate(discs: Sequence[Disc], low: float, high: float, chamfer: float, axis: Axis = "z") -> Manifold:
+def _plate(
+    discs: Sequence[Disc], low: float, high: float, chamfer: float, axis: Axis = "z"
+) -> Manifold:
     """Return a plate with the convex outline of discs between two heights along an axis, its edges chamfered, m."""
     full, inner = _outline(discs), _outline(discs, inset=chamfer)
     if chamfer == 0:
@@ -200,7 +241,9 @@ def _plate(discs: Sequence[Disc], low: float, high: float, chamfer: float, axis:
 def _copies_around_z(solid: Manifold, radius: float, count: int) -> Manifold:
     """Return copies of a solid around z at a radius, m, the first half a step from x."""
     angle = (np.arange(count) + 0.5) * (2 * np.pi / count)
-    centres = np.round(radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=-1), DECIMALS)
+    centres = np.round(
+        radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], axis=-1), DECIMALS
+    )
     return Manifold.compose([solid.translate(tuple(centre)) for centre in centres])
 
 

@@ -34,11 +34,15 @@ class AbaLoop:
         Pinocchio is not installed.
     """
 
-    def __init__(self, description: Description, controller: PDGravity, target: Array, step: float) -> None:
+    def __init__(
+        self, description: Description, controller: PDGravity, target: Array, step: float
+    ) -> None:
         self._pin = import_peer("pinocchio")
         self._model = pinocchio_model(description)
         self._data = self._model.createData()
-        self._kp, self._kd = (np.array(np.broadcast_to(gain, target.shape)) for gain in (controller.kp, controller.kd))
+        self._kp, self._kd = (
+            np.array(np.broadcast_to(gain, target.shape)) for gain in (controller.kp, controller.kd)
+        )
         self._effort = np.array(description.numbers.effort)
         self._target, self._step = target, step
 
@@ -46,11 +50,22 @@ class AbaLoop:
         """Return joint values and rates, shape (2n,), after a number of steps from rest at joint values, shape (n,)."""
         model, data, h, n = self._model, self._data, self._step, len(q0)
         aba, gravity = self._pin.aba, self._pin.computeGeneralizedGravity
-        add, multiply, subtract, least, largest = np.add, np.multiply, np.subtract, np.minimum, np.maximum
+        add, multiply, subtract, least, largest = (
+            np.add,
+            np.multiply,
+            np.subtract,
+            np.minimum,
+            np.maximum,
+        )
         target, kp, kd, effort = self._target, self._kp, self._kd, self._effort
         lowest, half = -effort, h / 2
         weights = h / 6 * np.array([1.0, 2.0, 2.0, 1.0])
-        y, stage, tau, damping = np.concatenate([q0, np.zeros(n)]), np.empty(2 * n), np.empty(n), np.empty(n)
+        y, stage, tau, damping = (
+            np.concatenate([q0, np.zeros(n)]),
+            np.empty(2 * n),
+            np.empty(n),
+            np.empty(n),
+        )
         q, qd, stage_q, stage_qd = y[:n], y[n:], stage[:n], stage[n:]
         slopes = np.empty((4, 2 * n))
         k1, k2, k3, _ = slopes

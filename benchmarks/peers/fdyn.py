@@ -29,7 +29,9 @@ class Fdyn:
         The toolbox is not installed.
     """
 
-    def __init__(self, description: Description, options: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self, description: Description, options: Mapping[str, float] | None = None
+    ) -> None:
         self.robot = toolbox_robot(description)
         self._options = dict(options or {})
 
@@ -39,14 +41,23 @@ class Fdyn:
         return run.q, run.qd
 
     def controlled(
-        self, controller: ComputedTorque, reference: Reference, q0: Array, qd0: Array, duration: float
+        self,
+        controller: ComputedTorque,
+        reference: Reference,
+        q0: Array,
+        qd0: Array,
+        duration: float,
     ) -> tuple[Array, Array]:
         """Return joint values and rates, shape (N, n) each, under computed torque by the toolbox's own ``rne``."""
         kp, kd = controller.kp, controller.kd
 
         def torque(robot: Any, t: float, q: Array, qd: Array) -> Array:
-            setpoint_q, setpoint_qd, setpoint_qdd = (rows[0] for rows in reference.sampled(np.array([t])))
-            tau: Array = robot.rne(q, qd, setpoint_qdd + kd * (setpoint_qd - qd) + kp * (setpoint_q - q))
+            setpoint_q, setpoint_qd, setpoint_qdd = (
+                rows[0] for rows in reference.sampled(np.array([t]))
+            )
+            tau: Array = robot.rne(
+                q, qd, setpoint_qdd + kd * (setpoint_qd - qd) + kp * (setpoint_q - q)
+            )
             return tau
 
         run = self.robot.fdyn(duration, q0, torque, qd0=qd0, solver_args=self._options)

@@ -28,7 +28,11 @@ class SampledPaths:
     """
 
     def __init__(
-        self, description: Description, obstacles: list[Obstacle], clearance: float, self_collision: bool = False
+        self,
+        description: Description,
+        obstacles: list[Obstacle],
+        clearance: float,
+        self_collision: bool = False,
     ) -> None:
         self._base, self._geometric = import_peer("ompl.base"), import_peer("ompl.geometric")
         self._util = import_peer("ompl.util")

@@ -57,7 +57,10 @@ class StraightTiming:
 
     def __init__(self, description: Description) -> None:
         self._toppra = import_peer("toppra")
-        self._constraint, self._algorithm = import_peer("toppra.constraint"), import_peer("toppra.algorithm")
+        self._constraint, self._algorithm = (
+            import_peer("toppra.constraint"),
+            import_peer("toppra.algorithm"),
+        )
         self._model = pinocchio_model(description)
         self._data = self._model.createData()
         logging.getLogger("toppra").setLevel(logging.ERROR)  # it logs every instance

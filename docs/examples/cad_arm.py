@@ -21,7 +21,9 @@ def box(size, centre):
 
 
 def drum(radius, length, centre, axis="z"):
-    turn = {"z": np.eye(4), "y": trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0))}[axis]
+    turn = {"z": np.eye(4), "y": trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0))}[
+        axis
+    ]
     cylinder = trimesh.creation.cylinder(radius, length, sections=64)
     return cylinder.apply_transform(trimesh.transformations.translation_matrix(centre) @ turn)
 

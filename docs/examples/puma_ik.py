@@ -12,7 +12,14 @@ d = [d1, 0, d3, d4, 0, 0]
 
 def link(i, q):
     c, s, ca, sa = cos(q), sin(q), cos(alpha[i]), sin(alpha[i])
-    return np.array([[c, -s * ca, s * sa, a[i] * c], [s, c * ca, -c * sa, a[i] * s], [0, sa, ca, d[i]], [0, 0, 0, 1]])
+    return np.array(
+        [
+            [c, -s * ca, s * sa, a[i] * c],
+            [s, c * ca, -c * sa, a[i] * s],
+            [0, sa, ca, d[i]],
+            [0, 0, 0, 1],
+        ]
+    )
 
 
 def fk(q):

@@ -29,7 +29,15 @@ if TYPE_CHECKING:
     from dhkit.description import Body, Payload
     from dhkit.description.table_rows import Quantity
     from dhkit.grading import GradeReport, Rubric
-    from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
+    from dhkit.kinematics import (
+        Classification,
+        IKPath,
+        IKSolutions,
+        Motion,
+        ReferenceAxes,
+        Singularities,
+        Workspace,
+    )
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
     from dhkit.planning import (
@@ -43,7 +51,14 @@ if TYPE_CHECKING:
         Scene,
     )
     from dhkit.planning.request import PathKeywords, PlanKeywords
-    from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
+    from dhkit.symbolic import (
+        BaseParameters,
+        CasadiFunctions,
+        Friction,
+        Lagrangian,
+        SymbolicKinematics,
+        Symbols,
+    )
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
@@ -68,16 +83,25 @@ class Arm:
     def __init__(self, description: Description) -> None:
         if isinstance(description, str | Path):
             name = str(description)
-            raise TypeError(f"found {name!r}; expected a Description: Arm.load({name!r}) reads a robot")
+            raise TypeError(
+                f"found {name!r}; expected a Description: Arm.load({name!r}) reads a robot"
+            )
         if not isinstance(description, describe.Description):
-            raise TypeError(f"found a {type(description).__name__}; expected a Description, as Arm.load reads it")
+            raise TypeError(
+                f"found a {type(description).__name__}; expected a Description, as Arm.load reads it"
+            )
         object.__setattr__(self, "_description", description)
 
     # Constructors
 
     @classmethod
     def load(
-        cls, name: str | Path, *, base: str | None = None, tip: str | None = None, as_designed: bool = False
+        cls,
+        name: str | Path,
+        *,
+        base: str | None = None,
+        tip: str | None = None,
+        as_designed: bool = False,
     ) -> Arm:
         """Return a robot of the library by name, or read a robot file (``.toml``) or a chain of a URDF by path.
 
@@ -105,8 +129,14 @@ class Arm:
         if text.startswith("example:") or is_file or ".urdf#" in text.lower():
             return cls.from_urdf(name, base=base, tip=tip, as_designed=as_designed)
         if base is not None or tip is not None or as_designed:
-            what = "as_designed is for rounded angles" if as_designed else "base and tip cut a chain out"
-            raise DescriptionError(f"{name}: {what} of a URDF; expected a .urdf file or example:NAME")
+            what = (
+                "as_designed is for rounded angles"
+                if as_designed
+                else "base and tip cut a chain out"
+            )
+            raise DescriptionError(
+                f"{name}: {what} of a URDF; expected a .urdf file or example:NAME"
+            )
         if isinstance(name, str) and not name.endswith(".toml") and "/" not in name:
             return cls(describe.library_robot(name))
         return cls(describe.read_robot(name))
@@ -135,7 +165,9 @@ class Arm:
         """
         from dhkit.model import extract_dh, urdf_source
 
-        path, own_base, own_tip = (name, None, None) if isinstance(name, Path) else urdf_source(name)
+        path, own_base, own_tip = (
+            (name, None, None) if isinstance(name, Path) else urdf_source(name)
+        )
         extraction = extract_dh(
             path,
             own_base if base is None else base,
@@ -188,7 +220,10 @@ class Arm:
         return Arm(describe.with_base(self._description, T))
 
     def with_payload(
-        self, mass: Quantity | Payload, com: Sequence[Quantity] = (0, 0, 0), inertia: ArrayLike | None = None
+        self,
+        mass: Quantity | Payload,
+        com: Sequence[Quantity] = (0, 0, 0),
+        inertia: ArrayLike | None = None,
     ) -> Arm:
         """Return this arm with a payload: mass, kg, and com (3,), m, in the tool's frame.
 
@@ -211,7 +246,11 @@ class Arm:
         torque: ArrayLike | None = None,
     ) -> Arm:
         """Return this arm with other limits, SI and radians; see :func:`dhkit.description.with_limits`."""
-        return Arm(describe.with_limits(self._description, lower=lower, upper=upper, velocity=velocity, torque=torque))
+        return Arm(
+            describe.with_limits(
+                self._description, lower=lower, upper=upper, velocity=velocity, torque=torque
+            )
+        )
 
     def with_uniform_links(self, masses: Sequence[Quantity] | None = None) -> Arm:
         """Return this arm whose links are thin uniform rods; see :func:`dhkit.description.with_uniform_links`."""
@@ -316,7 +355,11 @@ class Arm:
         return frames(self._description, q, out, threads)
 
     def jacobian(
-        self, q: ArrayLike, frame: ReferenceAxes = "world", out: Array | None = None, threads: int = 1
+        self,
+        q: ArrayLike,
+        frame: ReferenceAxes = "world",
+        out: Array | None = None,
+        threads: int = 1,
     ) -> Array:
         """Return the tool's Jacobian, shape (..., 6, n), m and rad: linear velocity of the tool's origin, then angular.
 
@@ -341,7 +384,11 @@ class Arm:
         return jacobian_dot(self._description, q, qd, frame, out, threads)
 
     def ik(
-        self, T: ArrayLike, seed: ArrayLike | None = None, out: Array | None = None, threads: int = 1
+        self,
+        T: ArrayLike,
+        seed: ArrayLike | None = None,
+        out: Array | None = None,
+        threads: int = 1,
     ) -> IKSolutions:
         """Return all closed-form solutions of fk(q) = T for poses (..., 4, 4), m.
 
@@ -424,7 +471,9 @@ class Arm:
         """Return the positions that the tool can reach, from random states; see :func:`dhkit.kinematics.workspace`."""
         from dhkit.kinematics import workspace
 
-        return workspace(self._description, samples, seed, edge=edge, threads=threads, progress=progress)
+        return workspace(
+            self._description, samples, seed, edge=edge, threads=threads, progress=progress
+        )
 
     def singularities(self) -> Singularities:
         """Return the singularities of the arm in closed form; see :func:`dhkit.kinematics.singularities`."""
@@ -456,7 +505,9 @@ class Arm:
 
         return mass_matrix(self._description, q, out, threads)
 
-    def coriolis_matrix(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    def coriolis_matrix(
+        self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+    ) -> Array:
         """Return the Coriolis matrix C by Christoffel symbols, shape (..., n, n), so that C qd is in N m and N."""
         from dhkit.dynamics import coriolis_matrix
 
@@ -468,7 +519,9 @@ class Arm:
 
         return gravity_torque(self._description, q, out, threads)
 
-    def bias(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    def bias(
+        self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+    ) -> Array:
         """Return C qd + g, shape (..., n), N m and N."""
         from dhkit.dynamics import bias
 
@@ -510,7 +563,9 @@ class Arm:
 
         return forward_dynamics(self._description, q, qd, tau, wrench, friction, out, threads)
 
-    def kinetic_energy(self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+    def kinetic_energy(
+        self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+    ) -> Array:
         """Return the kinetic energy with drives, shape (...), J."""
         from dhkit.dynamics import kinetic_energy
 
@@ -529,7 +584,11 @@ class Arm:
         return power(self._description, qd, tau, out)
 
     def friction_torque(
-        self, qd: ArrayLike, friction: Friction | None = None, out: Array | None = None, threads: int = 1
+        self,
+        qd: ArrayLike,
+        friction: Friction | None = None,
+        out: Array | None = None,
+        threads: int = 1,
     ) -> Array:
         """Return the friction torques, shape (..., n), N m and N; see :func:`dhkit.dynamics.friction_torque`."""
         from dhkit.dynamics import friction_torque
@@ -559,7 +618,9 @@ class Arm:
         """Simulate the arm under a controller; see :func:`dhkit.control.simulate`."""
         from dhkit.control import simulate
 
-        return simulate(self._description, controller, reference, duration, q0, qd0, options=options, **keywords)
+        return simulate(
+            self._description, controller, reference, duration, q0, qd0, options=options, **keywords
+        )
 
     def simulate_batch(
         self,
@@ -575,7 +636,9 @@ class Arm:
         """Simulate a batch of arms, with their states advanced together; see :func:`dhkit.control.simulate_batch`."""
         from dhkit.control import simulate_batch
 
-        return simulate_batch(self._description, controller, reference, duration, q0, qd0, options=options, **keywords)
+        return simulate_batch(
+            self._description, controller, reference, duration, q0, qd0, options=options, **keywords
+        )
 
     def compare(
         self,
@@ -716,7 +779,9 @@ class Arm:
         """Return the motion of the tool along a circle or an arc; see :func:`dhkit.trajectories.circle`."""
         from dhkit.trajectories import circle
 
-        return circle(self._description, T0, centre, axis, angle, q0, duration, limits, turning, torques)
+        return circle(
+            self._description, T0, centre, axis, angle, q0, duration, limits, turning, torques
+        )
 
     def planner(
         self,
@@ -832,7 +897,9 @@ class Arm:
             independent=independent,
         )
 
-    def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
+    def distance(
+        self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False
+    ) -> Distances:
         """Return the distances of the links from obstacles and from each other; see :func:`dhkit.planning.distance`."""
         from dhkit.planning import distance
 
@@ -864,7 +931,9 @@ class Arm:
         from dhkit.grading import grade_answers
 
         given = {**(answers or {}), **quantities}
-        return grade_answers(self._description, given, names, task, rubric, seed=seed, explain=explain)
+        return grade_answers(
+            self._description, given, names, task, rubric, seed=seed, explain=explain
+        )
 
     def derive(self, symbols: Symbols = "file") -> Lagrangian:
         """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.
@@ -969,7 +1038,9 @@ class Arm:
 
     def __repr__(self) -> str:
         described = f"{self._description.kinds}, {self._description.convention.value} DH"
-        return repr_line(f"Arm {self.name}", summary=", ".join([described, *self._description.tool_texts]))
+        return repr_line(
+            f"Arm {self.name}", summary=", ".join([described, *self._description.tool_texts])
+        )
 
     def _repr_html_(self) -> str:
         return self._description._repr_html_()

@@ -28,7 +28,9 @@ class cached_property(Generic[Value]):  # noqa: N801 - as functools names it
     @overload
     def __get__(self, instance: object, owner: type | None = None) -> Value: ...
 
-    def __get__(self, instance: object | None, owner: type | None = None) -> cached_property[Value] | Value:
+    def __get__(
+        self, instance: object | None, owner: type | None = None
+    ) -> cached_property[Value] | Value:
         if instance is None:
             return self
         # Found by the object itself from now on, since this class has no __set__.

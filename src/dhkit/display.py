@@ -77,7 +77,10 @@ def value_line(value: Any) -> str:
     If the line is too long, numbers are rounded to four digits and lists are shortened.
     """
     for number, most in (repr, LONGEST_LINE), (_rounded, LONGEST_LINE), (_rounded, 3):
-        named = (f"{item.name}={_written(getattr(value, item.name), number, most)}" for item in fields(value))
+        named = (
+            f"{item.name}={_written(getattr(value, item.name), number, most)}"
+            for item in fields(value)
+        )
         line = f"{type(value).__qualname__}({', '.join(named)})"
         if len(line) <= LONGEST_LINE and line.isprintable():
             return line
@@ -128,9 +131,15 @@ def html_table(
     hidden = (len(rows) if count is None else count) - len(body)
     if hidden > 0:
         width = max(len(headings), max(map(len, rows), default=1))
-        body.append(f'<tr><td colspan="{width}" style="text-align:left">… and {hidden} more</td></tr>')
+        body.append(
+            f'<tr><td colspan="{width}" style="text-align:left">… and {hidden} more</td></tr>'
+        )
     head = f"<thead>{line(headings, 'th')}</thead>" if headings else ""
-    title = f'<caption style="text-align:left">{_escaped(caption, _LONGEST_TEXT)}</caption>' if caption else ""
+    title = (
+        f'<caption style="text-align:left">{_escaped(caption, _LONGEST_TEXT)}</caption>'
+        if caption
+        else ""
+    )
     return f"<table>{title}{head}<tbody>{''.join(body)}</tbody></table>"
 
 

@@ -39,14 +39,18 @@ class Options:
         if type(options) is cls and not keywords:
             return options  # it was checked when it was made
         if further := [name for name in options.changed if name not in known]:
-            raise TypeError(f"options has {', '.join(further)}; expected {cls.__name__}, with {', '.join(known)}")
+            raise TypeError(
+                f"options has {', '.join(further)}; expected {cls.__name__}, with {', '.join(known)}"
+            )
         return cls(**{**{name: getattr(options, name) for name in known}, **keywords})
 
     @property
     def changed(self) -> dict[str, Any]:
         """The options that are not the defaults."""
         values = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
-        return {name: value for name, (value, default) in values.items() if not _is_same(value, default)}
+        return {
+            name: value for name, (value, default) in values.items() if not _is_same(value, default)
+        }
 
     def __repr__(self) -> str:
         summary = ", ".join(f"{name}={value!r}" for name, value in self.changed.items())
@@ -54,4 +58,6 @@ class Options:
 
 
 def _is_same(value: object, default: object) -> bool:
-    return value is default or (type(value) is type(default) and bool(value == default))  # arrays are not defaults
+    return value is default or (
+        type(value) is type(default) and bool(value == default)
+    )  # arrays are not defaults

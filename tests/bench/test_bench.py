@@ -33,7 +33,15 @@ from dhkit.bench.benchmark_report import BATCH, duration
 from dhkit.bench.contenders import import_peer, one_by_one
 from dhkit.bench.geometry import OrthoParallel, bare, joint_axes
 from dhkit.bench.machine import cores
-from dhkit.bench.peers import all_contenders, dhkit_arm, eaik, ikpy, pinocchio, roboticstoolbox, ssik
+from dhkit.bench.peers import (
+    all_contenders,
+    dhkit_arm,
+    eaik,
+    ikpy,
+    pinocchio,
+    roboticstoolbox,
+    ssik,
+)
 from dhkit.bench.rounds import items_within
 from dhkit.cli import main
 
@@ -77,7 +85,9 @@ def failing(workload):
 @pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", ["planar2r", "puma560"])
 def test_a_report_is_complete(name):
-    report = run(Arm.load(name), ("fk", "jacobian"), batch=50, repeats=3, probes=False, contenders=QUICK)
+    report = run(
+        Arm.load(name), ("fk", "jacobian"), batch=50, repeats=3, probes=False, contenders=QUICK
+    )
     assert not report.missing
     assert [(row.quantity, row.contender) for row in report.rows] == [
         (contender.quantity, contender.name)
@@ -102,7 +112,14 @@ def test_a_report_is_complete(name):
 
 @pytest.mark.usefixtures("uncompiled")
 def test_a_report_is_json_and_markdown():
-    report = run(Arm.load("planar2r"), ("fk",), batch=20, repeats=1, probes=False, contenders=[*QUICK, liar("peer")])
+    report = run(
+        Arm.load("planar2r"),
+        ("fk",),
+        batch=20,
+        repeats=1,
+        probes=False,
+        contenders=[*QUICK, liar("peer")],
+    )
     plain = report.json()
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
     assert plain["rows"][0]["agrees"] is True
@@ -121,7 +138,14 @@ def liar(name):
 @pytest.mark.usefixtures("uncompiled")
 def test_a_contender_that_disagrees_is_reported_with_its_error_and_timed():
     honest = Contender("honest", "fk", Mode.SINGLE, agreeing)
-    report = run(Arm.load("planar2r"), ["fk"], batch=20, repeats=1, probes=False, contenders=[honest, liar("liar")])
+    report = run(
+        Arm.load("planar2r"),
+        ["fk"],
+        batch=20,
+        repeats=1,
+        probes=False,
+        contenders=[honest, liar("liar")],
+    )
     told = {row.contender: row for row in report.rows}
     assert told["honest"].verdict == Verdict(0.0)
     assert told["liar"].verdict.error == pytest.approx(1e-3)
@@ -133,8 +157,12 @@ def test_a_contender_that_disagrees_is_reported_with_its_error_and_timed():
 @pytest.mark.usefixtures("uncompiled")
 def test_a_contender_that_fails_is_missing_with_the_reason():
     broken = Contender("broken", "fk", Mode.BATCH, failing)
-    report = run(Arm.load("planar2r"), ["fk"], batch=20, repeats=1, probes=False, contenders=[broken])
-    assert report.missing == (Missing("fk", "broken", "failed: RuntimeError: out of cheese", failed=True),)
+    report = run(
+        Arm.load("planar2r"), ["fk"], batch=20, repeats=1, probes=False, contenders=[broken]
+    )
+    assert report.missing == (
+        Missing("fk", "broken", "failed: RuntimeError: out of cheese", failed=True),
+    )
     assert not report.rows
 
 
@@ -143,7 +171,9 @@ def test_peers_that_are_not_installed_are_listed():
     report = run(Arm.load("puma560"), ("fk",), batch=20, repeats=1, probes=False)
     assert {row.contender for row in report.rows} == {c.name for c in QUICK if c.quantity == "fk"}
     missing = {gap.name for gap in report.missing}
-    assert missing == {c.name for c in all_contenders() if c.quantity == "fk"} - {row.contender for row in report.rows}
+    assert missing == {c.name for c in all_contenders() if c.quantity == "fk"} - {
+        row.contender for row in report.rows
+    }
     assert all("not installed" in gap.reason for gap in report.missing)
     assert "pip install -e '.[bench]'" in str(report)
 
@@ -195,7 +225,10 @@ def test_dhkits_inverse_kinematics_is_asked_the_same_way(monkeypatch):
     workload = Workload.of(arm, 6, 1, 0)
 
     def ik(self, T, seed=None, out=None, threads=1):
-        index = [int(np.argmin(np.abs(workload.T - pose).sum(axis=(1, 2)))) for pose in np.reshape(T, (-1, 4, 4))]
+        index = [
+            int(np.argmin(np.abs(workload.T - pose).sum(axis=(1, 2))))
+            for pose in np.reshape(T, (-1, 4, 4))
+        ]
         q = np.full((len(index), 2, arm.n), np.nan) if out is None else out
         q[:, 0] = workload.q[index]
         return SimpleNamespace(q=q, valid=~np.isnan(q).any(axis=-1))
@@ -215,7 +248,9 @@ def test_an_interrupted_run_reports_what_it_measured():
         if line == "fk: round 2 of 9":
             raise KeyboardInterrupt
 
-    report = run(Arm.load("planar2r"), ("fk", "jacobian"), batch=10, progress=stop, contenders=QUICK)
+    report = run(
+        Arm.load("planar2r"), ("fk", "jacobian"), batch=10, progress=stop, contenders=QUICK
+    )
     assert report.interrupted
     assert {row.quantity for row in report.rows} == {"fk"}
     assert {row.rounds for row in report.rows} == {2}
@@ -237,7 +272,9 @@ def test_unusable_arguments_are_named(arguments, complaint):
 
 
 def test_a_missing_package_says_how_to_get_it():
-    with pytest.raises(UnavailableError, match=r"no module named no_such_peer; `.venv/bin/pip install"):
+    with pytest.raises(
+        UnavailableError, match=r"no module named no_such_peer; `.venv/bin/pip install"
+    ):
         import_peer("no_such_peer")
 
 
@@ -259,7 +296,14 @@ def test_an_ortho_parallel_arm_stands_upright_at_its_zero(name):
 
 
 def chain(family, angles):
-    steps = [(0, 0, 0), (family.a1, 0, 0), (0, 0, family.c2), (family.a2, family.b, family.c3), (0, 0, 0), (0, 0, 0)]
+    steps = [
+        (0, 0, 0),
+        (family.a1, 0, 0),
+        (0, 0, family.c2),
+        (family.a2, family.b, family.c3),
+        (0, 0, 0),
+        (0, 0, 0),
+    ]
     T = np.eye(4)
     for step, axis, angle in zip(steps, "zyyzyz", angles, strict=True):
         T[:3, 3] += T[:3, :3] @ step
@@ -269,7 +313,9 @@ def chain(family, angles):
 
 def rotation(axis, angle):
     c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]] if axis == "z" else [[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    return np.array(
+        [[c, -s, 0], [s, c, 0], [0, 0, 1]] if axis == "z" else [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+    )
 
 
 @pytest.mark.parametrize("name", ["puma560", "kr5", "panda"])
@@ -332,7 +378,9 @@ def test_two_threads_are_held_against_a_control_loop(monkeypatch):
 
 def test_memory_is_measured_in_a_process_of_its_own():
     try:
-        memory = probes.peak_memory(Workload.of(Arm.load("planar2r"), 1000, 1, 0), "fk", "new arrays")
+        memory = probes.peak_memory(
+            Workload.of(Arm.load("planar2r"), 1000, 1, 0), "fk", "new arrays"
+        )
     except UnavailableError as error:
         pytest.skip(str(error))
     assert (memory.inputs, memory.outputs) == (1000 * 2 * 8, 1000 * 16 * 8)
@@ -347,7 +395,9 @@ def test_a_process_that_fails_says_why():
 def test_requirements_are_judged_where_they_are_asked():
     scaling, memory = ThreadScaling("fk", 1.7, 1.9), PeakMemory("fk", "out=", 48, 128, 16)
     assert memory.share == pytest.approx((48 + 128 + 16) / (48 + 128))
-    report = BenchReport("puma560", BATCH, 1, 0, (), (), (), (scaling,), (memory,), (), Machine.here())
+    report = BenchReport(
+        "puma560", BATCH, 1, 0, (), (), (), (scaling,), (memory,), (), Machine.here()
+    )
     asked = targets(report)
     met = {line.what: line.met for line in asked}
     assert met["scaling to two threads over a control loop's"] is True
@@ -358,7 +408,13 @@ def test_requirements_are_judged_where_they_are_asked():
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(1.5, "1.5 s"), (0.0123, "12.3 ms"), (4.5e-6, "4.5 µs"), (2.5e-7, "250 ns"), (3.21e-9, "3.21 ns")],
+    [
+        (1.5, "1.5 s"),
+        (0.0123, "12.3 ms"),
+        (4.5e-6, "4.5 µs"),
+        (2.5e-7, "250 ns"),
+        (3.21e-9, "3.21 ns"),
+    ],
 )
 def test_times_are_in_the_unit_that_suits_them(seconds, text):
     assert duration(seconds) == text
@@ -366,7 +422,18 @@ def test_times_are_in_the_unit_that_suits_them(seconds, text):
 
 @pytest.mark.usefixtures("no_peers", "uncompiled")
 def test_the_command_prints_json_and_writes_both_files(capsys, tmp_path):
-    arguments = ["bench", "fk", "--robot", "planar2r", "--batch", "20", "--repeats", "1", "--no-probes", "--json"]
+    arguments = [
+        "bench",
+        "fk",
+        "--robot",
+        "planar2r",
+        "--batch",
+        "20",
+        "--repeats",
+        "1",
+        "--no-probes",
+        "--json",
+    ]
     with pytest.raises(SystemExit) as ended:
         main([*arguments, "-o", str(tmp_path / "result")])
     out, err = capsys.readouterr()

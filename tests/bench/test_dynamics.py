@@ -64,7 +64,20 @@ def test_operations_are_counted():
     (asked,) = (
         line
         for line in targets(
-            BenchReport("puma560", BATCH, 1, 0, (), (), (), (), (), (), Machine.here(), operations=tuple(counted))
+            BenchReport(
+                "puma560",
+                BATCH,
+                1,
+                0,
+                (),
+                (),
+                (),
+                (),
+                (),
+                (),
+                Machine.here(),
+                operations=tuple(counted),
+            )
         )
         if line.what == "additions and multiplications"
     )

@@ -41,7 +41,11 @@ def test_a_report_has_all_contenders_at_both_speeds():
         fine = rows.pop("dhkit, 48 intervals, fine")
         assert fine.mean == fine.most == 1
         assert all(row.most > 1 for row in rows.values())
-        assert rows["quintic"].mean > rows["best trapezoid"].mean > rows["toppra, straight joint path"].mean
+        assert (
+            rows["quintic"].mean
+            > rows["best trapezoid"].mean
+            > rows["toppra, straight joint path"].mean
+        )
     assert [build.intervals for build in report.builds] == [8, 12, 48]
     assert any("pair 1 of 1" in line for line in told)
     assert json.loads(json.dumps(report.json(), allow_nan=False)) == report.json()
@@ -68,7 +72,9 @@ def test_an_interrupted_run_reports_what_it_has_seen():
         if "pair 2" in line:
             raise KeyboardInterrupt
 
-    report = compare_motions(library_robot("planar2r"), 2, meshes=(), intervals=6, speeds=(1.0,), progress=stop)
+    report = compare_motions(
+        library_robot("planar2r"), 2, meshes=(), intervals=6, speeds=(1.0,), progress=stop
+    )
     assert report.interrupted
     assert "(interrupted)" in report.markdown()
     assert all(row.pairs == 1 for row in report.rows)
@@ -108,5 +114,8 @@ def test_scenes_are_the_same_again_and_their_straight_way_collides():
 def test_motions_in_scenes_that_ompl_solves():
     pytest.importorskip("ompl")
     report = compare_scenes(2, kinds=[SceneKind("ur5")], compared=1, starts=1)
-    assert all(np.isfinite(result.duration) and result.shortfall < 1e-6 > result.excess for result in report.results)
+    assert all(
+        np.isfinite(result.duration) and result.shortfall < 1e-6 > result.excess
+        for result in report.results
+    )
     assert "2 of 2" in str(report)

@@ -43,8 +43,12 @@ def test_its_branches_are_ours(arm, name):
     workload = Workload.of(arm, 12, 1, seed=0)
     contender = next(contender for contender in opw.contenders() if contender.name == name)
     ours = arm.ik(workload.T)
-    for theirs, q, valid in zip(contender.setup(workload).answers(12), ours.q, ours.valid, strict=True):
-        apart = np.abs(np.remainder(theirs[:, None] - q[valid] + np.pi, 2 * np.pi) - np.pi).max(axis=-1)
+    for theirs, q, valid in zip(
+        contender.setup(workload).answers(12), ours.q, ours.valid, strict=True
+    ):
+        apart = np.abs(np.remainder(theirs[:, None] - q[valid] + np.pi, 2 * np.pi) - np.pi).max(
+            axis=-1
+        )
         assert apart.shape == (valid.sum(), valid.sum())
         assert apart.min(axis=0).max() < SAME
         assert apart.min(axis=1).max() < SAME

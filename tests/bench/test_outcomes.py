@@ -7,7 +7,18 @@ import json
 import pytest
 
 from dhkit import Arm
-from dhkit.bench import Contender, Ending, Missing, Mode, Row, Task, UnavailableError, Verdict, run, runner
+from dhkit.bench import (
+    Contender,
+    Ending,
+    Missing,
+    Mode,
+    Row,
+    Task,
+    UnavailableError,
+    Verdict,
+    run,
+    runner,
+)
 from dhkit.bench.contenders import one_by_one
 from dhkit.bench.peers import dhkit_arm, pinocchio
 from dhkit.bench.runner import outcome_of
@@ -26,7 +37,9 @@ def uncompiled(monkeypatch):
 
 
 def figures(contender, error, own=False, quantity="fk"):
-    return Row(quantity, contender, Mode.SINGLE, own, 1, 1, 1.0, 1.0, 1.0, Verdict(error), None, None)
+    return Row(
+        quantity, contender, Mode.SINGLE, own, 1, 1, 1.0, 1.0, 1.0, Verdict(error), None, None
+    )
 
 
 OURS, THEIRS, LIES = figures("dhkit", 0.0, own=True), figures("peer", 1e-12), figures("liar", 1e-3)
@@ -52,7 +65,9 @@ OURS, THEIRS, LIES = figures("dhkit", 0.0, own=True), figures("peer", 1e-12), fi
 )
 def test_a_comparison_ends_in_one_of_six_ways(rows, missing, ending):
     other = [figures("dhkit", None, own=True, quantity="ik")]
-    outcome = outcome_of("fk", [*rows, *other], [*missing, Missing("ik", "peer", "failed: x", failed=True)])
+    outcome = outcome_of(
+        "fk", [*rows, *other], [*missing, Missing("ik", "peer", "failed: x", failed=True)]
+    )
     assert outcome.ending is ending
     assert outcome.ok == (ending in (Ending.COMPLETE, Ending.PEERS_FAILED))
     assert bool(outcome.causes) == (ending is not Ending.COMPLETE and bool(rows or missing))
@@ -94,9 +109,25 @@ def bench(monkeypatch, capsys, contenders, *options):
     """Return the exit status of `dhkit bench fk`, its report as data, and what it says beside its progress."""
     monkeypatch.setattr(runner, "all_contenders", lambda: contenders)
     with pytest.raises(SystemExit) as ended:
-        main(["bench", "fk", "--robot", "planar2r", "--batch=4", "--repeats=1", "--no-probes", "--json", *options])
+        main(
+            [
+                "bench",
+                "fk",
+                "--robot",
+                "planar2r",
+                "--batch=4",
+                "--repeats=1",
+                "--no-probes",
+                "--json",
+                *options,
+            ]
+        )
     out, err = capsys.readouterr()
-    return ended.value.code, json.loads(out), [line for line in err.splitlines() if line.startswith("dhkit: ")]
+    return (
+        ended.value.code,
+        json.loads(out),
+        [line for line in err.splitlines() if line.startswith("dhkit: ")],
+    )
 
 
 @pytest.mark.parametrize(
@@ -111,7 +142,12 @@ def bench(monkeypatch, capsys, contenders, *options):
             "dhkit: fk: every contender failed; ours: DISAGREES: 1e-03 (and 1 more)",
         ),
         (
-            [*OWN_CONTENDERS, contender(failing, "ours", own=True), contender(failing), contender(agreeing)],
+            [
+                *OWN_CONTENDERS,
+                contender(failing, "ours", own=True),
+                contender(failing),
+                contender(agreeing),
+            ],
             "dhkit: fk: dhkit itself failed; ours: failed: RuntimeError: out of cheese",
         ),
         (
@@ -122,7 +158,9 @@ def bench(monkeypatch, capsys, contenders, *options):
         ([], "dhkit: fk: nothing could be timed"),
     ],
 )
-def test_the_command_fails_in_one_line_where_there_is_nothing_to_compare(monkeypatch, capsys, contenders, said):
+def test_the_command_fails_in_one_line_where_there_is_nothing_to_compare(
+    monkeypatch, capsys, contenders, said
+):
     status, report, lines = bench(monkeypatch, capsys, contenders)
     assert status == 1
     assert lines == [said]
@@ -133,7 +171,9 @@ def test_peers_that_fail_beside_dhkit_are_noted(monkeypatch, capsys):
     peers = contender(failing, "broken"), contender(lying, "liar"), contender(agreeing, "honest")
     status, report, lines = bench(monkeypatch, capsys, (*OWN_CONTENDERS, *peers))
     assert status == 0
-    assert lines == ["dhkit: note: fk: peers failed; broken: failed: RuntimeError: out of cheese (and 1 more)"]
+    assert lines == [
+        "dhkit: note: fk: peers failed; broken: failed: RuntimeError: out of cheese (and 1 more)"
+    ]
     assert report["outcomes"] == [
         {
             "quantity": "fk",
@@ -161,7 +201,9 @@ def test_the_command_says_nothing_where_peers_are_not_installed(monkeypatch, cap
 
 def test_each_quantity_that_fails_has_a_line(monkeypatch, capsys):
     also = [Contender("ours", "jacobian", Mode.SINGLE, failing, own=True)]
-    status, _, lines = bench(monkeypatch, capsys, [contender(failing, "ours", own=True), *also], "jacobian")
+    status, _, lines = bench(
+        monkeypatch, capsys, [contender(failing, "ours", own=True), *also], "jacobian"
+    )
     assert status == 1
     assert [line.split("; ")[0] for line in lines] == [
         f"dhkit: {quantity}: every contender failed" for quantity in ("fk", "jacobian")
@@ -169,7 +211,9 @@ def test_each_quantity_that_fails_has_a_line(monkeypatch, capsys):
 
 
 def test_both_files_are_written_where_every_contender_fails(monkeypatch, capsys, tmp_path):
-    status, report, _ = bench(monkeypatch, capsys, [contender(failing)], "--output", str(tmp_path / "result"))
+    status, report, _ = bench(
+        monkeypatch, capsys, [contender(failing)], "--output", str(tmp_path / "result")
+    )
     assert status == 1
     assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8")) == report
     assert "out of cheese" in (tmp_path / "result.md").read_text(encoding="utf-8")
@@ -181,9 +225,13 @@ def test_an_interrupted_run_has_no_outcome_of_what_it_did_not_finish():
             raise KeyboardInterrupt
 
     own = dhkit_arm.contenders()
-    report = run(Arm.load("planar2r"), ("fk", "jacobian"), batch=4, repeats=1, progress=stop, contenders=own)
+    report = run(
+        Arm.load("planar2r"), ("fk", "jacobian"), batch=4, repeats=1, progress=stop, contenders=own
+    )
     assert report.interrupted
-    assert [(outcome.quantity, outcome.ending) for outcome in report.outcomes] == [("fk", Ending.COMPLETE)]
+    assert [(outcome.quantity, outcome.ending) for outcome in report.outcomes] == [
+        ("fk", Ending.COMPLETE)
+    ]
 
 
 @pytest.mark.parametrize("name", ["planar2r", "al5d", "pan_tilt", "cobra600", "puma560"])
@@ -199,9 +247,13 @@ def test_out_is_for_closed_forms():
     """An arm that ssik solves takes no out=: dhkit is timed without, and has not failed."""
     pytest.importorskip("ssik")
     into_out = next(
-        entry for entry in dhkit_arm.contenders() if (entry.quantity, entry.name) == ("ik", dhkit_arm.BATCH)
+        entry
+        for entry in dhkit_arm.contenders()
+        if (entry.quantity, entry.name) == ("ik", dhkit_arm.BATCH)
     )
-    report = run(Arm.load("panda"), ("ik",), batch=1, repeats=1, probes=False, contenders=[into_out])
+    report = run(
+        Arm.load("panda"), ("ik",), batch=1, repeats=1, probes=False, contenders=[into_out]
+    )
     reason = "arm.ik takes out= only where a closed form decides how many branches there are"
     assert report.missing == (Missing("ik", dhkit_arm.BATCH, reason, own=True),)
 

@@ -31,7 +31,14 @@ def test_a_report_is_complete_without_the_toolbox(monkeypatch):
     without_toolbox(monkeypatch)
     told = []
     report = compare_simulations(Arm.load("planar2r"), TINY, progress=told.append)
-    assert told == ["compiling", "one arm", "3 arms", "models", "a passive swing", "a continuous controller"]
+    assert told == [
+        "compiling",
+        "one arm",
+        "3 arms",
+        "models",
+        "a passive swing",
+        "a continuous controller",
+    ]
     assert not report.interrupted
     assert {gap.reason for gap in report.missing} == {"not installed"}
     (single,) = report.single
@@ -41,7 +48,9 @@ def test_a_report_is_complete_without_the_toolbox(monkeypatch):
     loop = report.batch[-1]
     assert loop.difference < SAME
     assert all(row.difference is None for row in report.batch[:-1])
-    assert all(row.timing.lower <= row.timing.seconds <= row.timing.upper for row in report.integration)
+    assert all(
+        row.timing.lower <= row.timing.seconds <= row.timing.upper for row in report.integration
+    )
     swing = {row.contender: row for row in report.integration if "swing" in row.problem}
     assert swing["dhkit, RK4 at 4 kHz"].joint_error < SAME
     assert swing["dhkit, RK4 at 4 kHz"].drift < SAME

@@ -70,7 +70,8 @@ def test_info_lists_the_bodies_of_a_link_that_has_several(dhkit, tmp_path):
     path = tmp_path / "loaded.toml"
     write_robot(Arm.load("planar2r").with_payload(0.5, (0.1, 0, 0)).description, path)
     assert (
-        "link 2: body 1 of 1.5 kg at (-0.2, 0, 0) m, payload of 0.5 kg at (0.1, 0, 0) m" in dhkit("info", str(path))[1]
+        "link 2: body 1 of 1.5 kg at (-0.2, 0, 0) m, payload of 0.5 kg at (0.1, 0, 0) m"
+        in dhkit("info", str(path))[1]
     )
     bodies = json.loads(dhkit("info", str(path), "--json")[1])["joints"][1]["bodies"]
     assert bodies[1] == {"name": "payload", "mass_kg": 0.5, "com_m": [0.1, 0.0, 0.0]}
@@ -126,7 +127,10 @@ def test_the_schema_is_printed(dhkit):
         (["verify", "ur5", "--samples", "0"], "Invalid value"),
         (["verify", "ur5", "--samples", "many"], "Invalid value"),
         (["build", "ur5", "-o", "/dev/null/all.urdf"], "/dev/null: a file; expected a folder"),
-        (["schema", "cake"], "no schema 'cake'; expected robot, assignment, sheet, rubric, task, motion"),
+        (
+            ["schema", "cake"],
+            "no schema 'cake'; expected robot, assignment, sheet, rubric, task, motion",
+        ),
         (["demo", "--robot", "cake"], "no robot 'cake'"),
     ],
 )
@@ -143,7 +147,10 @@ def test_bad_input_is_one_line_and_status_2(dhkit, arguments, complaint, tmp_pat
 def test_reach_is_the_tools_and_the_sum_of_lengths_has_its_own_name(capsys):
     import json
 
-    for command in (["info", "puma560", "--json"], ["workspace", "puma560", "--samples", "2000", "--json"]):
+    for command in (
+        ["info", "puma560", "--json"],
+        ["workspace", "puma560", "--samples", "2000", "--json"],
+    ):
         with pytest.raises(SystemExit):
             main(command)
         facts = json.loads(capsys.readouterr().out.splitlines()[-1])
@@ -152,7 +159,8 @@ def test_reach_is_the_tools_and_the_sum_of_lengths_has_its_own_name(capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "position", "completed"), [("dhkit ext", 1, "extract"), ("dhkit extract --pa", 2, "--package-dir")]
+    ("words", "position", "completed"),
+    [("dhkit ext", 1, "extract"), ("dhkit extract --pa", 2, "--package-dir")],
 )
 def test_a_shell_completes_commands_and_options(words, position, completed):
     import os
@@ -160,6 +168,12 @@ def test_a_shell_completes_commands_and_options(words, position, completed):
     import sys
 
     asked = {"_DHKIT_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(position)}
-    command = [sys.executable, "-c", "import sys; sys.argv[0] = 'dhkit'; from dhkit.cli import main; main()"]
-    done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=False)
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; sys.argv[0] = 'dhkit'; from dhkit.cli import main; main()",
+    ]
+    done = subprocess.run(
+        command, env=os.environ | asked, capture_output=True, text=True, check=False
+    )
     assert completed in done.stdout.split(), done

@@ -23,14 +23,18 @@ from mesh_shapes import ONE_LINK_WITH_A_MESH
 def test_the_commands_are_those_of_the_modules():
     assert list(typer.main.get_command(app).commands) == list(COMMANDS)
     modules = [importlib.import_module(f"dhkit.cli.{module}") for module in set(COMMANDS.values())]
-    assert {name for module in modules for name in typer.main.get_group(module.app).commands} == set(COMMANDS)
+    assert {
+        name for module in modules for name in typer.main.get_group(module.app).commands
+    } == set(COMMANDS)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_is_named_by_its_module_and_its_options_have_help(name):
     command = load_command(name)
     assert f"`dhkit {name}`" in importlib.import_module(f"dhkit.cli.{COMMANDS[name]}").__doc__
-    assert all(getattr(parameter, "help", None) for parameter in command.params if parameter.name != "help")
+    assert all(
+        getattr(parameter, "help", None) for parameter in command.params if parameter.name != "help"
+    )
 
 
 def test_statuses_are_those_of_shells():
@@ -45,7 +49,9 @@ def test_motion_files_are_checked_before_they_are_written_and_listed_after(tmp_p
     files.check((".npz",))
     written = files.write(arm, arm.quintic([0.0, 0.0], [0.5, 0.5], 1.0), "there", "A motion.")
     assert written == [str(tmp_path / name) for name in ("motion.npz", "page.html", "figure.png")]
-    assert all((tmp_path / name).stat().st_size for name in ("motion.npz", "page.html", "figure.png"))
+    assert all(
+        (tmp_path / name).stat().st_size for name in ("motion.npz", "page.html", "figure.png")
+    )
 
 
 def test_an_output_folder_is_no_file(tmp_path):
@@ -59,7 +65,11 @@ def test_json_has_units_in_its_keys_and_null_for_what_is_not_finite():
     arm = Arm.load("stanford")
     q = np.full(6, np.pi)
     entry = joint_entry(arm, "q", q, degrees=True)
-    assert list(entry) == ["q_deg"] and entry["q_deg"][0] == pytest.approx(180) and entry["q_deg"][2] == np.pi
+    assert (
+        list(entry) == ["q_deg"]
+        and entry["q_deg"][0] == pytest.approx(180)
+        and entry["q_deg"][2] == np.pi
+    )
     assert finite({"a": (1.0, float("inf")), "b": float("nan")}) == {"a": [1.0, None], "b": None}
 
 
@@ -73,7 +83,9 @@ def test_a_benchmark_is_written_as_markdown_and_json_whatever_the_suffix(tmp_pat
 
     written = write(Report(), tmp_path / "times.txt")
     assert written == (tmp_path / "times.md", tmp_path / "times.json")
-    assert written[0].read_text() == "# Times\n" and json.loads(written[1].read_text("utf-8")) == {"unit": "µs"}
+    assert written[0].read_text() == "# Times\n" and json.loads(written[1].read_text("utf-8")) == {
+        "unit": "µs"
+    }
 
 
 @pytest.mark.parametrize(
@@ -91,4 +103,7 @@ def test_commands_print_the_warnings_of_a_robot_file(words, tmp_path, monkeypatc
     with pytest.raises(SystemExit):
         main(words)
     written = capsys.readouterr().err
-    assert "dhkit: warning: link of turn: shape.mesh: 'link.stl' is not a mesh that can be read" in written
+    assert (
+        "dhkit: warning: link of turn: shape.mesh: 'link.stl' is not a mesh that can be read"
+        in written
+    )

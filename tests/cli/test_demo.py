@@ -58,7 +58,8 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(demo):
     assert "8 branches of one pose close FK to" in out
     assert "proved equal to Euler and Lagrange's equation" in out
     assert re.search(
-        r"plan +[\d.]+ s +0\.8\d+ s with torques up to 100 %, the quintic 1\.4\d+ s .*all limits kept", out
+        r"plan +[\d.]+ s +0\.8\d+ s with torques up to 100 %, the quintic 1\.4\d+ s .*all limits kept",
+        out,
     )
     assert sorted(path.name for path in folder.iterdir()) == [
         "control.html",
@@ -91,9 +92,13 @@ def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(demo, chrom
     page.open(f"file://{folder}/index.html")
     page.press(" ")  # pause
     with_arm = page.screenshot()
-    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = false; }); dhkit.stage.viewer.set_dirty()")
+    page.evaluate(
+        "dhkit.stage.nodes.forEach(node => { node.visible = false; }); dhkit.stage.viewer.set_dirty()"
+    )
     without = page.screenshot()
-    page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = true; }); dhkit.stage.viewer.set_dirty()")
+    page.evaluate(
+        "dhkit.stage.nodes.forEach(node => { node.visible = true; }); dhkit.stage.viewer.set_dirty()"
+    )
     page.press(" ")
     page.until("dhkit.motion && !document.hidden")
     page.settle()
@@ -103,7 +108,9 @@ def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(demo, chrom
         # The arm and its shadow cover a good part of the page; an empty scene would differ by nothing.
         assert np.any(np.abs(with_arm - without) > 20, axis=-1).sum() > 10_000
         assert np.any(np.abs(with_arm - later) > 20, axis=-1).sum() > 200
-        assert [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))] == []
+        assert [
+            url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))
+        ] == []
         assert page.errors == []
     finally:
         page.close()
@@ -143,7 +150,9 @@ def test_a_demo_into_a_file_is_refused(tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["planar2r", *(pytest.param(x, marks=only_accepting) for x in ("puma560", "panda"))])
+@pytest.mark.parametrize(
+    "name", ["planar2r", *(pytest.param(x, marks=only_accepting) for x in ("puma560", "panda"))]
+)
 def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, demo, chromium):
     folder, _ = demo(name)
     page = chromium.page()
@@ -154,7 +163,10 @@ def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, de
         with_ghosts = page.screenshot()
         page.press("o")
         without = page.screenshot()
-        assert page.evaluate("document.getElementById('overlays').getAttribute('aria-pressed')") == "false"
+        assert (
+            page.evaluate("document.getElementById('overlays').getAttribute('aria-pressed')")
+            == "false"
+        )
         assert np.any(np.abs(with_ghosts - without) > 20, axis=-1).sum() > 1000
         assert page.errors == []
     finally:

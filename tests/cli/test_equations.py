@@ -56,7 +56,11 @@ def test_formats(dhkit, tmp_path, form, sign):
     assert (status, err) == (0, "")
     assert sign in out
     if form != "matlab":
-        assert dhkit("planar2r", "--format", form, "--output", "here.txt") == (0, "wrote here.txt\n", "")
+        assert dhkit("planar2r", "--format", form, "--output", "here.txt") == (
+            0,
+            "wrote here.txt\n",
+            "",
+        )
         assert (tmp_path / "here.txt").read_text("utf-8") == out
 
 
@@ -64,9 +68,16 @@ def test_matlab_writes_a_file_for_each_function(dhkit, tmp_path):
     status, out, _ = dhkit("planar2r", "--format", "matlab", "--output", ".", "--json")
     assert status == 0
     names = ["planar2r_C.m", "planar2r_M.m", "planar2r_g.m", "planar2r_parameters.m"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(json.loads(out)["files"]) == names
+    assert (
+        sorted(path.name for path in tmp_path.iterdir())
+        == sorted(json.loads(out)["files"])
+        == names
+    )
     status, _, err = dhkit("planar2r", "--format", "matlab", "--output", "file.m")
-    assert (status, err) == (2, "dhkit: file.m: expected a folder; MATLAB wants a file for every function\n")
+    assert (status, err) == (
+        2,
+        "dhkit: file.m: expected a folder; MATLAB wants a file for every function\n",
+    )
 
 
 def test_machines_are_told(dhkit):
@@ -86,7 +97,10 @@ def test_machines_are_told(dhkit):
         (["--symbols", "all"], "--symbols: found 'all'; expected none, file, inertial"),
         (["--output", "/dev/null/where.tex"], "/dev/null: a file; expected a folder"),
         (["--output", "."], ". is a folder; expected the name of a file"),
-        (["--output", "robot.toml"], "robot.toml: equations would overwrite a robot file; expected another name"),
+        (
+            ["--output", "robot.toml"],
+            "robot.toml: equations would overwrite a robot file; expected another name",
+        ),
     ],
 )
 def test_bad_input_is_refused_in_one_line(dhkit, arguments, message):
@@ -97,7 +111,9 @@ def test_bad_input_is_refused_in_one_line(dhkit, arguments, message):
 def test_what_is_too_long_to_read_names_the_alternatives(dhkit):
     status, out, err = dhkit("puma560", "--symbols", "inertial", "--what", "tau")
     assert (status, out) == (2, "")
-    assert re.fullmatch(r"dhkit: tau1 has \d+ terms, .*code \(python, c, matlab\) has no limit.*\n", err)
+    assert re.fullmatch(
+        r"dhkit: tau1 has \d+ terms, .*code \(python, c, matlab\) has no limit.*\n", err
+    )
 
 
 def test_a_page_is_whole_and_harmless(dhkit, tmp_path):
@@ -110,7 +126,9 @@ def test_a_page_is_whole_and_harmless(dhkit, tmp_path):
     assert status == 0
     assert "<script" not in out
     assert html.escape("<script>alert(1)</script>") in out
-    assert not re.search(r"(src|href)=|url\(|@import|https?://(?!www\.w3\.org/1998/Math/MathML)", out)
+    assert not re.search(
+        r"(src|href)=|url\(|@import|https?://(?!www\.w3\.org/1998/Math/MathML)", out
+    )
     assert "Denavit-Hartenberg table" in out
     assert "<td>mass_1</td>" in out
 
@@ -129,14 +147,18 @@ def test_a_browser_shows_the_page(dhkit, tmp_path, chromium):
     page.call("Page.navigate", url=address)
     page.until("document.readyState === 'complete' && document.querySelector('math')")
     sizes = "[...document.querySelectorAll('.display math')].map(m => m.getBoundingClientRect())"
-    assert page.evaluate(f"{sizes}.every(r => r.width > 50 && r.height > 10 && r.right < innerWidth)")
+    assert page.evaluate(
+        f"{sizes}.every(r => r.width > 50 && r.height > 10 && r.right < innerWidth)"
+    )
     assert page.evaluate(f"{sizes}.length") == 6
     assert (page.requests, page.errors) == ([address], [])
     page.close()
 
 
 def test_listing_commands_needs_no_sympy():
-    code = "import sys, dhkit.cli; sys.exit('sympy' in sys.modules or 'latex2mathml' in sys.modules)"
+    code = (
+        "import sys, dhkit.cli; sys.exit('sympy' in sys.modules or 'latex2mathml' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
@@ -145,7 +167,10 @@ def test_base_parameters_on_every_kind_of_paper(dhkit, tmp_path):
         status, out, err = dhkit("planar2r", "--what", "M,g", "--base-parameters", "--format", form)
         assert (status, err) == (0, "")
         assert "MX" in out
-    assert "l_{1} (m_{1} + m_{2})" in dhkit("planar2r", "--base-parameters", "--what", "g", "--format", "latex")[1]
+    assert (
+        "l_{1} (m_{1} + m_{2})"
+        in dhkit("planar2r", "--base-parameters", "--what", "g", "--format", "latex")[1]
+    )
     status, _, err = dhkit("planar2r", "--base-parameters", "--symbols", "none")
     assert (status, err) == (
         2,

@@ -30,7 +30,9 @@ def test_the_table_is_printed_and_written_with_its_meshes(tmp_path, capsys):
     assert "wrote" in out
     again = Arm.load(tmp_path / "out" / "puma.toml")
     puma = Arm.load("puma560")
-    assert again.fk([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]) == pytest.approx(puma.fk([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]), abs=1e-9)
+    assert again.fk([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]) == pytest.approx(
+        puma.fk([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]), abs=1e-9
+    )
     assert not any("mesh" in warning for warning in again.description.warnings)
     assert len(list((tmp_path / "out" / "meshes").rglob("*.stl"))) == 7
 
@@ -40,7 +42,15 @@ def test_json_has_the_table_and_the_residual(capsys):
     facts = json.loads(out)
     assert code == 0
     assert facts["convention"] == "modified"
-    assert [round(joint["d_m"], 6) for joint in facts["joints"]] == [0.333, 0, 0.316, 0, 0.384, 0, 0]
+    assert [round(joint["d_m"], 6) for joint in facts["joints"]] == [
+        0.333,
+        0,
+        0.316,
+        0,
+        0.384,
+        0,
+        0,
+    ]
     assert facts["residual"]["tool"] < 1e-9
 
 

@@ -44,7 +44,9 @@ def dhkit(capsys):
     def run(*sheets, rubric=None, jobs=None, seconds=60.0, **delivery):
         if delivery.pop("json", False):
             delivery["form"] = "json"
-        status = grade.run(sheets, judge, rubric or Rubric(), Delivery(**delivery), jobs=jobs, seconds=seconds)
+        status = grade.run(
+            sheets, judge, rubric or Rubric(), Delivery(**delivery), jobs=jobs, seconds=seconds
+        )
         return status, *capsys.readouterr()
 
     return run
@@ -87,7 +89,8 @@ def test_a_class_is_a_table_and_its_mistakes(dhkit, folder):
 
 
 @pytest.mark.parametrize(
-    ("form", "sign"), [("text", "wrong (62.5"), ("json", '"verdict"'), ("junit", "<testsuites"), ("html", "<math")]
+    ("form", "sign"),
+    [("text", "wrong (62.5"), ("json", '"verdict"'), ("junit", "<testsuites"), ("html", "<math")],
 )
 def test_formats(dhkit, folder, tmp_path, form, sign):
     path = folder / "ada" / "answer.toml"
@@ -116,12 +119,23 @@ def test_an_output_folder(dhkit, folder, tmp_path):
     assert status == 2
     assert printed.endswith(f"wrote {out}\n")
     rows = list(csv.DictReader((out / "marks.csv").read_text("utf-8").splitlines()))
-    assert [(row["student"], row["points"]) for row in rows] == [("ada", "62.5"), ("bob", "100"), ("cleo", "0")]
-    student, teacher = (out / "students" / "ada.html").read_text("utf-8"), (out / "class.html").read_text("utf-8")
+    assert [(row["student"], row["points"]) for row in rows] == [
+        ("ada", "62.5"),
+        ("bob", "100"),
+        ("cleo", "0"),
+    ]
+    student, teacher = (
+        (out / "students" / "ada.html").read_text("utf-8"),
+        (out / "class.html").read_text("utf-8"),
+    )
     assert "look at the sign of V" in student
     assert "wrong sign" not in student
     assert "wrong sign" in teacher
-    assert sorted(path.name for path in (out / "records").iterdir()) == ["ada.json", "bob.json", "cleo.json"]
+    assert sorted(path.name for path in (out / "records").iterdir()) == [
+        "ada.json",
+        "bob.json",
+        "cleo.json",
+    ]
 
 
 def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
@@ -141,7 +155,9 @@ def test_marking_again_needs_reports(tmp_path):
 def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
     """Students whose names are paths, hidden, long or alike get files of their own, in the folder."""
     monkeypatch.setattr(
-        sys.modules[__name__], "judge", lambda path: replace(RIGHT, student=path.read_text(encoding="utf-8"))
+        sys.modules[__name__],
+        "judge",
+        lambda path: replace(RIGHT, student=path.read_text(encoding="utf-8")),
     )
     names = ["../../up", "..", "", "Ada", "ada", "x" * 300, "a/b\n", "Zoë", "con\x1b[31m"]
     for k, name in enumerate(names):
@@ -149,7 +165,9 @@ def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
     dhkit(*(tmp_path / f"{k}.toml" for k in range(len(names))), output=tmp_path / "out")
     written = list((tmp_path / "out" / "students").iterdir())
     assert len({path.name.casefold() for path in written}) == len(names)
-    assert all(re.fullmatch(r"\w[\w.-]*\.html", path.name) and len(path.name) < 100 for path in written)
+    assert all(
+        re.fullmatch(r"\w[\w.-]*\.html", path.name) and len(path.name) < 100 for path in written
+    )
 
 
 @pytest.mark.parametrize(
@@ -162,7 +180,9 @@ def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
         ({"output": "marks.csv"}, "expected a folder for the reports of several sheets"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_before_anything_is_judged(dhkit, folder, options, complaint):
+def test_what_cannot_be_meant_is_refused_before_anything_is_judged(
+    dhkit, folder, options, complaint
+):
     if "output" in options:
         options = options | {"output": folder.parent / options["output"]}
     with pytest.raises(AnswerError, match=re.escape(complaint)):
@@ -201,6 +221,10 @@ def test_an_output_that_cannot_be_meant_is_refused_before_anything_is_judged(tmp
     Delivery(output=tmp_path).check(several=True)
     Delivery("html", output=tmp_path / "report.html").check(several=True)
     Delivery(output=tmp_path / "report.txt").check(several=False)
-    for name, form, several in (("report", "text", True), ("a.txt", "text", True), ("ada.tex", "html", False)):
+    for name, form, several in (
+        ("report", "text", True),
+        ("a.txt", "text", True),
+        ("ada.tex", "html", False),
+    ):
         with pytest.raises(AnswerError, match="expected"):
             Delivery(form, output=tmp_path / name).check(several)

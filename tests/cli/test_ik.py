@@ -38,7 +38,10 @@ def facts(ik):
 
 
 def joints(said):
-    rows = [branch["q_rad"] if "q_rad" in branch else np.radians(branch["q_deg"]) for branch in said["branches"]]
+    rows = [
+        branch["q_rad"] if "q_rad" in branch else np.radians(branch["q_deg"])
+        for branch in said["branches"]
+    ]
     return np.array(rows)
 
 
@@ -79,14 +82,33 @@ def test_all_ways_to_give_a_pose_agree(facts, tmp_path):
     (tmp_path / "rows.txt").write_text(repr(T[:3].tolist()))
     answers = [
         facts("puma560", "--xyz", "17*inch", "-0.1", "0.2", "--euler", "0", "pi/2", "-pi/4"),
-        facts("puma560", "--euler", "0", "90", "-45", "--degrees", "--xyz", "0.4318", "-100*mm", "0.2"),
+        facts(
+            "puma560", "--euler", "0", "90", "-45", "--degrees", "--xyz", "0.4318", "-100*mm", "0.2"
+        ),
         facts("puma560", "--xyz=0.4318,-0.1,0.2", "--euler=0,90,-45", "--degrees"),
-        facts("--xyz", "0.4318", "-.1", "0.2", "--euler", "-45", "90", "0", "--order", "zyx", "--degrees", "puma560"),
+        facts(
+            "--xyz",
+            "0.4318",
+            "-.1",
+            "0.2",
+            "--euler",
+            "-45",
+            "90",
+            "0",
+            "--order",
+            "zyx",
+            "--degrees",
+            "puma560",
+        ),
         facts("puma560", "--matrix", *numbers),
         facts("puma560", "--matrix", *numbers[:12]),
         facts("puma560", "--matrix", str(tmp_path / "pose.txt")),
         facts("puma560", "--matrix", str(tmp_path / "rows.txt")),
-        facts("puma560", "--like", *(f"{x:.17g}" for x in Arm.load("puma560").ik(T).branch("right up no-flip"))),
+        facts(
+            "puma560",
+            "--like",
+            *(f"{x:.17g}" for x in Arm.load("puma560").ik(T).branch("right up no-flip")),
+        ),
     ]
     for status, said in answers:
         assert status == 0
@@ -97,7 +119,9 @@ def test_all_ways_to_give_a_pose_agree(facts, tmp_path):
 
 def test_people_see_the_family_the_pose_and_every_branch(ik):
     arm = Arm.load("puma560")
-    status, out, err = ik("puma560", "--like", "nominal", "--degrees", "--near", "0", "45", "180", "0", "45", "0")
+    status, out, err = ik(
+        "puma560", "--like", "nominal", "--degrees", "--near", "0", "45", "180", "0", "45", "0"
+    )
     assert (status, err) == (0, "")
     assert str(arm.family) in out
     assert "pose: x y z 0.596303 -0.15005 0.657476 m, XYZ 0 90 0 °" in out
@@ -170,13 +194,20 @@ def test_an_arm_near_a_family_is_solved_from_its_neighbour(facts, ik, tmp_path):
     file = str(tmp_path / "tilted.toml")
     arm.save(file)
     status, said = facts(file, "--like", "0.3", "0.5", "-1.2", "0.4", "0.9", "-0.2")
-    assert (status, said["method"], len(said["branches"])) == (0, "iteration from an arm of the family", 8)
+    assert (status, said["method"], len(said["branches"])) == (
+        0,
+        "iteration from an arm of the family",
+        8,
+    )
     assert all(branch["flags"] == ["refined"] for branch in said["branches"])
     assert np.abs(arm.fk(joints(said)) - np.array(said["T"])).max() < 1e-9
     _, out, _ = ik(file, "--like", "0.3", "0.5", "-1.2", "0.4", "0.9", "-0.2")
     assert "8 solutions found by iteration from an arm of the family" in out
     for xyz, refusal in (
-        (("0", "0", "0.3"), "no solution found by iteration from an arm of the family, which does not prove"),
+        (
+            ("0", "0", "0.3"),
+            "no solution found by iteration from an arm of the family, which does not prove",
+        ),
         (("9", "0", "0"), "out of reach: farther from axis 1 than all links in one line"),
     ):
         status, out, _ = ik(file, "--xyz", *xyz)
@@ -201,7 +232,10 @@ def test_iteration_steps_in_where_ssik_is_missing(facts, ik, monkeypatch):
     ("arguments", "complaint"),
     [
         (["puma560"], "expected one of --xyz, --matrix and --like"),
-        (["puma560", "--xyz", "1", "0", "0", "--like", "ready"], "expected one of --xyz, --matrix and --like"),
+        (
+            ["puma560", "--xyz", "1", "0", "0", "--like", "ready"],
+            "expected one of --xyz, --matrix and --like",
+        ),
         (["puma560", "--xyz", "1", "2"], "--xyz: 2 values; expected 3"),
         (["puma560", "--xyz", "1", "2", "three"], "--xyz: unknown name 'three'"),
         (["puma560", "--xyz", "1", "2", "3", "4"], "unexpected extra argument"),
@@ -209,7 +243,10 @@ def test_iteration_steps_in_where_ssik_is_missing(facts, ik, monkeypatch):
         (["puma560", "--xyz", "1", "2", "3", "--euler", "1", "2"], "--euler: 2 values; expected 3"),
         (["puma560", "--xyz", "1", "2", "3", "--order", "XXY"], "order is 'XXY'"),
         (["puma560", "--xzy", "1", "2", "3"], "No such option: --xzy"),
-        (["puma560", "--like", "raedy"], "no configuration 'raedy'; it has zero, ready, nominal, stretched"),
+        (
+            ["puma560", "--like", "raedy"],
+            "no configuration 'raedy'; it has zero, ready, nominal, stretched",
+        ),
         (["puma560", "--like", "1", "2"], "2 values of --like; expected 6"),
         (["puma560", "--like", "ready", "--near", "1", "2"], "2 values of --near; expected 6"),
         (["puma560", "--matrix", "1", "2", "3"], "--matrix: 3 values; expected 16 or 12"),

@@ -34,16 +34,31 @@ def parts(tmp_path, monkeypatch, capsys):
 
 
 def test_an_assembly_becomes_a_robot(dhkit, parts, tmp_path):
-    status, out, err = dhkit("import-cad", parts, "--table", TABLE, "--density", "2700", "-o", tmp_path / "arm")
+    status, out, err = dhkit(
+        "import-cad", parts, "--table", TABLE, "--density", "2700", "-o", tmp_path / "arm"
+    )
     assert (status, err) == (0, "")
-    assert "unit: mm, found by size" in out and "link 3: arm assembly - link3-1.STL, 12 triangles, 0.3888 kg" in out
+    assert (
+        "unit: mm, found by size" in out
+        and "link 3: arm assembly - link3-1.STL, 12 triangles, 0.3888 kg" in out
+    )
     assert f"wrote {tmp_path / 'arm' / 'robot.toml'}" in out
     arm = Arm.load(tmp_path / "arm" / "robot.toml")
     assert arm.description.warnings == ()
     assert arm.verify(20).ok
     assert arm.gravity_torque(arm.configurations["ready"]).shape == (3,)
     assert arm.description.joints[1].a.text == "upper"
-    assert dhkit("picture", tmp_path / "arm" / "robot.toml", "-o", tmp_path / "arm.png", "--size", "160x120")[0] == 0
+    assert (
+        dhkit(
+            "picture",
+            tmp_path / "arm" / "robot.toml",
+            "-o",
+            tmp_path / "arm.png",
+            "--size",
+            "160x120",
+        )[0]
+        == 0
+    )
 
 
 def test_masses_maps_and_poses_as_json(dhkit, parts, tmp_path):
@@ -57,14 +72,18 @@ def test_masses_maps_and_poses_as_json(dhkit, parts, tmp_path):
     assert told["triangles"]["3"] == 12 and len(told["files"]) == 10
     assert any("as given" in note for note in told["notes"])
     description = Arm.load(tmp_path / "arm" / "robot.toml").description
-    assert [joint.body and float(joint.body.mass) for joint in description.joints] == pytest.approx([3.2, 1.5, None])
+    assert [joint.body and float(joint.body.mass) for joint in description.joints] == pytest.approx(
+        [3.2, 1.5, None]
+    )
 
 
 def test_a_part_is_left_out_by_a_map_to_no_link(dhkit, parts, tmp_path):
     (parts / "gripper.stl").write_bytes((parts / "arm assembly - link3-1.STL").read_bytes())
     status, _, err = dhkit("import-cad", parts, "--table", TABLE, "-o", tmp_path / "arm")
     assert status == 2 and "for a part of no link" in err
-    status, out, err = dhkit("import-cad", parts, "--table", TABLE, "--map", "-=gripper.stl", "-o", tmp_path / "arm")
+    status, out, err = dhkit(
+        "import-cad", parts, "--table", TABLE, "--map", "-=gripper.stl", "-o", tmp_path / "arm"
+    )
     assert (status, err) == (0, "") and "left out: gripper.stl" in out
     assert "pose of the export: the configuration ready: q = 0, 1.047, -1.047" in out
 
@@ -82,7 +101,10 @@ def test_links_without_masses_are_named(dhkit, parts, tmp_path):
         (["--mass", "1=heavy"], "--mass 1=heavy: expected a number of kg"),
         (["--mass", "1=1", "--mass", "1=2"], "--mass: link 1 twice"),
         (["--mass", "9=1"], "links 0 to 3"),
-        (["--map", "forearm.stl"], '--map forearm.stl: expected LINK=VALUE, such as "3=forearm.stl"'),
+        (
+            ["--map", "forearm.stl"],
+            '--map forearm.stl: expected LINK=VALUE, such as "3=forearm.stl"',
+        ),
         (["--map", "3=../../etc/passwd"], "the mapping names '../../etc/passwd'"),
         (["--unit", "furlong"], "unit is 'furlong'"),
         (["--density", "-1"], "density is -1"),
@@ -92,8 +114,12 @@ def test_links_without_masses_are_named(dhkit, parts, tmp_path):
         (["--table", "none.toml"], "none.toml: no such file"),
     ],
 )
-def test_what_is_wrong_is_one_line_and_nothing_is_written(dhkit, parts, tmp_path, options, complaint):
-    status, out, err = dhkit("import-cad", parts, "--table", TABLE, "-o", tmp_path / "arm", *options)
+def test_what_is_wrong_is_one_line_and_nothing_is_written(
+    dhkit, parts, tmp_path, options, complaint
+):
+    status, out, err = dhkit(
+        "import-cad", parts, "--table", TABLE, "-o", tmp_path / "arm", *options
+    )
     assert (status, out) == (2, "")
     assert complaint in err and err.startswith("dhkit: ") and err.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["parts"]

@@ -44,13 +44,19 @@ main(sys.argv[2:])
 """
 
 
-PLAN, SIMULATE = "plan puma560 --to nominal --via zero --intervals 240", "simulate puma560 --duration 300"
+PLAN, SIMULATE = (
+    "plan puma560 --to nominal --via zero --intervals 240",
+    "simulate puma560 --duration 300",
+)
 SECONDS = [0.005, 0.05, 0.25, 0.5, 0.8, 1.2]
 """At first what both commands import, then their work."""
 TIMES = (
     [(command, seconds) for command in (PLAN, SIMULATE) for seconds in SECONDS]
     if ACCEPTING
-    else [*((PLAN, seconds) for seconds in SECONDS[::2]), *((SIMULATE, seconds) for seconds in SECONDS[1::2])]
+    else [
+        *((PLAN, seconds) for seconds in SECONDS[::2]),
+        *((SIMULATE, seconds) for seconds in SECONDS[1::2]),
+    ]
 )
 
 
@@ -85,17 +91,32 @@ def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
     mark = f"{10**6 + os.getpid()}"
 
     def sleeping():
-        return [one for one in psutil.process_iter(["cmdline"]) if (one.info["cmdline"] or [])[-1:] == [mark]]
+        return [
+            one
+            for one in psutil.process_iter(["cmdline"])
+            if (one.info["cmdline"] or [])[-1:] == [mark]
+        ]
 
     (tmp_path / "student.py").write_text(WAITS.replace("MARK", mark))
-    command = [sys.executable, "-m", "dhkit", "check", "planar2r", str(tmp_path / "student.py"), "--seconds", "3600"]
+    command = [
+        sys.executable,
+        "-m",
+        "dhkit",
+        "check",
+        "planar2r",
+        str(tmp_path / "student.py"),
+        "--seconds",
+        "3600",
+    ]
     process = subprocess.Popen(
         command,
         env=os.environ | {"TMPDIR": str(tmp_path)},
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # tests under nohup ignore it
+        preexec_fn=lambda: signal.signal(
+            signal.SIGHUP, signal.SIG_DFL
+        ),  # tests under nohup ignore it
     )
     try:
         wait_for(sleeping, "the call of the program")
@@ -111,11 +132,16 @@ def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "seconds", [slow_if(seconds not in {0.0, 0.05}, seconds) for seconds in (0.0, 0.01, 0.05, 0.3, 0.6, 0.9)]
+    "seconds",
+    [slow_if(seconds not in {0.0, 0.05}, seconds) for seconds in (0.0, 0.01, 0.05, 0.3, 0.6, 0.9)],
 )
 def test_planning_is_interrupted_while_programs_are_made_and_solved(seconds):
     done = subprocess.run(
-        [sys.executable, "-c", PLANNING, str(seconds)], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", PLANNING, str(seconds)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.stdout == "interrupted\n", done.stderr
 

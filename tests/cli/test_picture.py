@@ -34,12 +34,36 @@ def test_an_arm_is_drawn_where_it_is_told(tmp_path, capsys):
 
 def test_a_motion_is_a_gif_or_numbered_pictures(tmp_path, motion):
     assert (
-        run("picture", "planar2r", "--motion", motion, "-o", tmp_path / "m.gif", "--rate", "5", "--size", "80x60") == 0
+        run(
+            "picture",
+            "planar2r",
+            "--motion",
+            motion,
+            "-o",
+            tmp_path / "m.gif",
+            "--rate",
+            "5",
+            "--size",
+            "80x60",
+        )
+        == 0
     )
     with Image.open(tmp_path / "m.gif") as gif:
         assert gif.n_frames == 6
     assert (
-        run("picture", "planar2r", "--motion", motion, "-o", tmp_path / "m.png", "--count", "3", "--size", "80x60") == 0
+        run(
+            "picture",
+            "planar2r",
+            "--motion",
+            motion,
+            "-o",
+            tmp_path / "m.png",
+            "--count",
+            "3",
+            "--size",
+            "80x60",
+        )
+        == 0
     )
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["m-1.png", "m-2.png", "m-3.png"]
 
@@ -55,7 +79,9 @@ def test_a_motion_is_a_gif_or_numbered_pictures(tmp_path, motion):
         (("-o", "a.png", "--at", "1 2", "--motion", "m.npz"), "expected one of them"),
     ],
 )
-def test_what_cannot_be_written_is_said_in_a_line(tmp_path, monkeypatch, capsys, arguments, complaint):
+def test_what_cannot_be_written_is_said_in_a_line(
+    tmp_path, monkeypatch, capsys, arguments, complaint
+):
     monkeypatch.chdir(tmp_path)
     assert run("picture", "planar2r", *arguments) == 2
     assert complaint in " ".join(capsys.readouterr().err.split())

@@ -53,7 +53,9 @@ def watched(monkeypatch, slot):
     """Return a list that takes what every page is written with."""
     messages, save = [], View.save_html
     monkeypatch.setattr(
-        View, "save_html", lambda view, path, **about: messages.append(view._state[slot]) or save(view, path, **about)
+        View,
+        "save_html",
+        lambda view, path, **about: messages.append(view._state[slot]) or save(view, path, **about),
     )
     return messages
 
@@ -65,16 +67,31 @@ def words(values):
 def test_the_puma_goes_from_ready_to_a_pose(facts):
     arm = Arm.load("puma560")
     status, said = facts(
-        "puma560", "--xyz", "0.5", "0.2", "0.3", "--euler", "0", "90", "0", "--velocity", "100", "--degrees"
+        "puma560",
+        "--xyz",
+        "0.5",
+        "0.2",
+        "0.3",
+        "--euler",
+        "0",
+        "90",
+        "0",
+        "--velocity",
+        "100",
+        "--degrees",
     )
     assert status == 0
     assert said["found"]
     assert said["certified"]
     assert said["violation"] <= KEPT
-    assert np.radians(said["start_deg"]) == pytest.approx(arm.configurations["ready"].tolist(), abs=ENDS)
+    assert np.radians(said["start_deg"]) == pytest.approx(
+        arm.configurations["ready"].tolist(), abs=ENDS
+    )
     assert np.abs(arm.fk(np.radians(said["goal_deg"]))[:3, 3] - [0.5, 0.2, 0.3]).max() < ENDS
     assert 0 < said["duration_s"] < said["classical_s"]["quintic"]
-    assert said["duration_s"] >= np.abs(np.subtract(said["goal_deg"], said["start_deg"])).max() / 100
+    assert (
+        said["duration_s"] >= np.abs(np.subtract(said["goal_deg"], said["start_deg"])).max() / 100
+    )
     assert said["files"] == []
 
 
@@ -82,7 +99,9 @@ def test_the_motion_is_the_one_of_python(facts):
     arm = Arm.load("planar2r")
     goal = [1.0, -0.5]
     _, said = facts("planar2r", "--from", "0", "0.5", "--to", *words(goal))
-    assert said["duration_s"] == pytest.approx(arm.plan([0, 0.5], goal, intervals=16).duration, rel=1e-9)
+    assert said["duration_s"] == pytest.approx(
+        arm.plan([0, 0.5], goal, intervals=16).duration, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("where", ["to", "like", slow_if(True, "matrix"), slow_if(True, "file")])
@@ -110,16 +129,27 @@ def test_files_are_written_and_read_back(plan, tmp_path):
     files = [tmp_path / name for name in ("run.npz", "run.html", "run.png")]
     trajectory, page, figure = map(str, files)
     status, out, _ = plan(
-        "planar2r", "--to", "1", "0.5", "-o", trajectory, "--html", page, "--figure", figure, *COARSE, "--json"
+        "planar2r",
+        "--to",
+        "1",
+        "0.5",
+        "-o",
+        trajectory,
+        "--html",
+        page,
+        "--figure",
+        figure,
+        *COARSE,
+        "--json",
     )
     said = json.loads(out)
     assert (status, said["files"]) == (0, [trajectory, page, figure])
     motion = Trajectory.load(trajectory, arm.description)
     assert motion.duration == said["duration_s"]
     assert np.abs(motion.q(motion.duration) - [1.0, 0.5]).max() < ENDS
-    assert np.abs(motion.tau(np.linspace(0, motion.duration, 999))).max() <= arm.description.numbers.effort.max() * (
-        1 + KEPT
-    )
+    assert np.abs(
+        motion.tau(np.linspace(0, motion.duration, 999))
+    ).max() <= arm.description.numbers.effort.max() * (1 + KEPT)
     with Image.open(figure) as picture:
         assert len(np.unique(np.asarray(picture.convert("L")))) > 50
     assert "planar2r" in files[1].read_text("utf-8")
@@ -173,7 +203,9 @@ def test_on_the_way_it_passes_where_it_is_told(plan, tmp_path):
     path = str(tmp_path / "run.npz")
     via = [[0.5, 1.2], [0.9, 0.1]]
     arguments = [word for place in via for word in ("--via", *words(place))]
-    status, _, err = plan("planar2r", "--to", "1.5", "0.5", *arguments, "--intervals", "24", "-o", path)
+    status, _, err = plan(
+        "planar2r", "--to", "1.5", "0.5", *arguments, "--intervals", "24", "-o", path
+    )
     assert (status, err) == (0, "")
     motion = Trajectory.load(path, Arm.load("planar2r").description)
     passed = motion.q(motion.breaks)
@@ -201,7 +233,18 @@ def test_the_tool_goes_straight(plan, tmp_path):
     goal = arm.fk(start)
     goal[:3, 3] += [0.05, 0.2, -0.1]
     status, out, err = plan(
-        *("puma560", "--from", "nominal", "--matrix", *words(goal), "--line", "--tool-speed", "0.5", "-o", path)
+        *(
+            "puma560",
+            "--from",
+            "nominal",
+            "--matrix",
+            *words(goal),
+            "--line",
+            "--tool-speed",
+            "0.5",
+            "-o",
+            path,
+        )
     )
     assert (status, err) == (0, "")
     assert "the tool along a straight line" in out
@@ -212,12 +255,26 @@ def test_the_tool_goes_straight(plan, tmp_path):
     way = positions - positions[0]
     assert np.abs(way - np.outer(way @ along, along)).max() < 1e-6
     assert np.abs(positions[-1] - goal[:3, 3]).max() < 1e-6
-    speeds = np.linalg.norm(np.einsum("kij,kj->ki", arm.jacobian(motion.q(t))[:, :3], motion.qd(t)), axis=1)
+    speeds = np.linalg.norm(
+        np.einsum("kij,kj->ki", arm.jacobian(motion.q(t))[:, :3], motion.qd(t)), axis=1
+    )
     assert 0.49 < speeds.max() < 0.5 * (1 + 1e-4)
 
 
 def test_a_load_is_carried_along_a_line(facts):
-    where = ("planar2r", "--from", "0.2", "1.2", "--to", "0.8", "1.0", "--torque", "30", "10", "--line")
+    where = (
+        "planar2r",
+        "--from",
+        "0.2",
+        "1.2",
+        "--to",
+        "0.8",
+        "1.0",
+        "--torque",
+        "30",
+        "10",
+        "--line",
+    )
     _, empty = facts(*where)
     status, loaded = facts(*where, "--payload", "0.5")
     assert status == 0
@@ -232,7 +289,9 @@ def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkey
     start, goal = np.array([0.9, 0.3, 0.3]), np.array([-0.9, -0.3, -0.3])
     direct = arm.plan(start, goal, intervals=16, compare=False)
     times = np.linspace(0, 1, 301)
-    assert arm.distance(direct.q(direct.duration * times), [ball]).distance.min() < 0  # it is in the way
+    assert (
+        arm.distance(direct.q(direct.duration * times), [ball]).distance.min() < 0
+    )  # it is in the way
     drawn = watched(monkeypatch, Slot.OBSTACLES)
     files = str(tmp_path / "run.npz"), str(tmp_path / "run.html")
     ends = ("--from", *words(start), "--to", *words(goal))
@@ -258,7 +317,11 @@ def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkey
         ("puma560 --to nominal --payload 90", 1, "cannot hold the arm there"),
         ("planar2r --to ready --from ready", 1, "start and goal are the same configuration"),
         ("planar2r --to 1 1 --sphere 0.1 @ 0.1 0.8 0", 1, "inside sphere"),
-        ("planar2r --to 1 1 --duration 0.01 --objective effort", 1, "a duration of 0.01 s is too short"),
+        (
+            "planar2r --to 1 1 --duration 0.01 --objective effort",
+            1,
+            "a duration of 0.01 s is too short",
+        ),
         ("puma560 --from ready --to nominal --line", 1, "the path meets a singularity at s = 0"),
         ("puma560 --to nowhere", 2, "puma560 has no configuration 'nowhere'; it has zero, ready"),
         ("puma560 --to 1 2", 2, "2 values of --to; expected 6 for puma560"),
@@ -266,19 +329,43 @@ def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkey
         ("planar2r --to 1 1 --xyz 1 1 0", 2, "no single goal; expected one of"),
         ("planar2r --to 1 1 --sphere 0.5", 2, "--sphere: found '0.5'; expected \"R @ X Y Z\", m"),
         ("planar2r --to 1 1 --sphere x @ 1 1 1", 2, "--sphere: "),
-        ("planar2r --to 1 1 --sphere -1 @ 1 1 1", 2, "sphere: radius is -1.0; expected a positive number"),
-        ("planar2r --to 1 1 --box 1 1 @ 1 1 1", 2, "--box: found '1 1 @ 1 1 1'; expected \"SX SY SZ @ X Y Z\", m"),
+        (
+            "planar2r --to 1 1 --sphere -1 @ 1 1 1",
+            2,
+            "sphere: radius is -1.0; expected a positive number",
+        ),
+        (
+            "planar2r --to 1 1 --box 1 1 @ 1 1 1",
+            2,
+            "--box: found '1 1 @ 1 1 1'; expected \"SX SY SZ @ X Y Z\", m",
+        ),
         ("planar2r --to 1 1 --floor low", 2, "--floor: "),
         ("planar2r --to 1 1 --payload -1", 2, "mass is -1 kg"),
         ("planar2r --to 1 1 --payload 1 @ 2", 2, "--payload: 1 values; expected 3"),
-        ("planar2r --to 1 1 --objective speed", 2, "--objective: found 'speed'; expected time, effort, energy, jerk"),
-        ("planar2r --to 1 1 --objective time + 0 effort", 2, "--objective: found '0 effort'; expected a positive"),
+        (
+            "planar2r --to 1 1 --objective speed",
+            2,
+            "--objective: found 'speed'; expected time, effort, energy, jerk",
+        ),
+        (
+            "planar2r --to 1 1 --objective time + 0 effort",
+            2,
+            "--objective: found '0 effort'; expected a positive",
+        ),
         ("planar2r --to 1 1 --velocity 1 2 3", 2, "--velocity: 3 values; expected 1 or 2"),
-        ("planar2r --to 1 1 --velocity -1", 2, "velocity of joint 1 is -1; expected a positive number"),
+        (
+            "planar2r --to 1 1 --velocity -1",
+            2,
+            "velocity of joint 1 is -1; expected a positive number",
+        ),
         ("planar2r --to 1 1 --tool-speed -1", 2, "ToolSpeed: -1.0; expected positive"),
         ("planar2r --to 1 1 --line --via 0 1", 2, "--line: found --via too"),
         ("planar2r --to 1 1 --line --sphere 0.1 @ 0.1 0.8 0", 1, "the path at s = "),
-        ("planar2r --to 1 1 -o run.txt", 2, "run.txt: ends in '.txt'; expected .npz, .mat, .csv, .yaml"),
+        (
+            "planar2r --to 1 1 -o run.txt",
+            2,
+            "run.txt: ends in '.txt'; expected .npz, .mat, .csv, .yaml",
+        ),
         ("planar2r --to 1 1 --figure run.xyz", 2, "run.xyz: ends in '.xyz'; expected .png"),
         ("planar2r --to 1 1 --html /dev/null/run.html", 2, "/dev/null: a file; expected a folder"),
     ],
@@ -307,7 +394,14 @@ def test_machines_are_told_that_there_is_no_motion(facts):
 
 @pytest.mark.parametrize(
     "text",
-    ["time", "energy", "effort + jerk", "1 time + 0.0001 effort", "2.5 jerk + 0.25 energy", "10000 effort + 3 time"],
+    [
+        "time",
+        "energy",
+        "effort + jerk",
+        "1 time + 0.0001 effort",
+        "2.5 jerk + 0.25 energy",
+        "10000 effort + 3 time",
+    ],
 )
 def test_an_objective_is_read_back(text):
     assert str(objective(text)) == text
@@ -339,4 +433,6 @@ def test_links_keep_away_from_each_other_and_from_the_floor(facts):
     status, kept = facts(*where, "--self-collision", "--floor", "-0.5")
     assert (status, kept["certified"]) == (0, True)
     assert "clearance" in [limit["what"] for limit in kept["limits"]]
-    assert kept["duration_s"] == pytest.approx(free["duration_s"], rel=0.01)  # nothing is in the way
+    assert kept["duration_s"] == pytest.approx(
+        free["duration_s"], rel=0.01
+    )  # nothing is in the way

@@ -34,9 +34,27 @@ def dhkit(capsys):
 
 def test_a_run_is_that_of_python_and_its_files_hold_it(dhkit, tmp_path):
     files = [tmp_path / name for name in ("run.npz", "run.png", "run.html")]
-    options = ("--controller", "pd-gravity", "--bandwidth", 15, "--friction", "stiction", "--compensate")
+    options = (
+        "--controller",
+        "pd-gravity",
+        "--bandwidth",
+        15,
+        "--friction",
+        "stiction",
+        "--compensate",
+    )
     status, out, _ = dhkit(
-        "simulate", "planar2r", *ENDS, *options, "-o", files[0], "--figure", files[1], "--html", files[2], "--json"
+        "simulate",
+        "planar2r",
+        *ENDS,
+        *options,
+        "-o",
+        files[0],
+        "--figure",
+        files[1],
+        "--html",
+        files[2],
+        "--json",
     )
     assert status == 0
     motion = ARM.quintic([0.1, 0.2], [0.5, -0.3], 1.0)
@@ -64,7 +82,9 @@ def test_a_payload_is_known_unless_it_is_said_not_to_be(dhkit):
 
 @pytest.mark.slow
 def test_text_names_joints_tool_and_energy(dhkit):
-    status, out, _ = dhkit("simulate", "stanford", "--controller", "pid", "--degrees", "--duration", "2.5")
+    status, out, _ = dhkit(
+        "simulate", "stanford", "--controller", "pid", "--degrees", "--duration", "2.5"
+    )
     assert status == 0
     assert "stanford: pid, 1000 Hz" in out and "2.5 s simulated in" in out
     assert len(re.findall(r"[\d.e-]+ +°", out)) == 5 and len(re.findall(r"[\d.e-]+ +m ", out)) == 1
@@ -113,7 +133,13 @@ def test_motions_come_from_files_of_dhkit_and_from_elsewhere(dhkit, tmp_path):
     (tmp_path / "theirs.csv").write_text("\n".join(lines) + "\n")
     savemat(tmp_path / "simulink.mat", {"tout": times, "yout": motion.q(times)})
     status, out, err = dhkit(
-        "simulate", "planar2r", "--motion", tmp_path / "simulink.mat", "--columns", "q=yout", "--json"
+        "simulate",
+        "planar2r",
+        "--motion",
+        tmp_path / "simulink.mat",
+        "--columns",
+        "q=yout",
+        "--json",
     )
     assert status == 0 and json.loads(out)["duration_s"] == pytest.approx(1.0), err
     status, _, err = dhkit("simulate", "planar2r", "--motion", tmp_path / "simulink.mat")
@@ -124,7 +150,9 @@ def test_motions_come_from_files_of_dhkit_and_from_elsewhere(dhkit, tmp_path):
         assert status == 0, err
         assert json.loads(out)["duration_s"] == pytest.approx(1.0)
         said = json.loads(out)
-        assert max(np.radians(said["peak_error_deg"]) if degrees else said["peak_error_rad"]) < 1e-3, path
+        assert (
+            max(np.radians(said["peak_error_deg"]) if degrees else said["peak_error_rad"]) < 1e-3
+        ), path
 
 
 def test_without_a_motion_every_joint_moves():
@@ -139,7 +167,16 @@ def test_compare_prints_a_table_and_draws_it(dhkit, tmp_path):
     figure = tmp_path / "compared.png"
     status, out, _ = dhkit("compare", "planar2r", *ENDS, "--figure", figure)
     assert status == 0
-    for name in ("pd", "pid", "pd-gravity", "feed-forward", "computed-torque", "operational-space", "adaptive", "lqr"):
+    for name in (
+        "pd",
+        "pid",
+        "pd-gravity",
+        "feed-forward",
+        "computed-torque",
+        "operational-space",
+        "adaptive",
+        "lqr",
+    ):
         assert re.search(rf"^{name} ", out, re.MULTILINE), name
     assert figure.stat().st_size > 10_000
     status, out, _ = dhkit("compare", "planar2r", *ENDS, "--controllers", "pid, lqr", "--json")
@@ -157,7 +194,11 @@ def test_play_writes_pages_of_motions_and_simulations(dhkit, tmp_path, monkeypat
     monkeypatch.setattr(View, "save_html", spy)
     motion = ARM.quintic([0.1, 0.2], [0.5, -0.3], 1.0)
     run = ARM.simulate(PDGravity.tuned(ARM), motion)
-    for path in (motion.save(tmp_path / "motion.npz"), run.save(tmp_path / "run.csv"), run.save(tmp_path / "run.mat")):
+    for path in (
+        motion.save(tmp_path / "motion.npz"),
+        run.save(tmp_path / "run.csv"),
+        run.save(tmp_path / "run.mat"),
+    ):
         page = path.with_suffix(".html")
         status, out, err = dhkit("play", "planar2r", path, "--html", page)
         assert status == 0, err
@@ -166,7 +207,10 @@ def test_play_writes_pages_of_motions_and_simulations(dhkit, tmp_path, monkeypat
 
 
 BAD = {
-    "no such controller": (("simulate", "planar2r", "--controller", "pidd"), "controller is 'pidd'; expected pd, pid,"),
+    "no such controller": (
+        ("simulate", "planar2r", "--controller", "pidd"),
+        "controller is 'pidd'; expected pd, pid,",
+    ),
     "no such friction": (
         ("simulate", "planar2r", "--friction", "some"),
         "--friction: found 'some'; expected none, stiction",
@@ -177,18 +221,36 @@ BAD = {
         ("simulate", "planar2r", "--push", "1", "2", "@", "0", "1"),
         "--push: 2 values; expected 3",
     ),
-    "a push without a time": (("simulate", "planar2r", "--push", "1", "2", "3"), "--push: found '1 2 3'; expected"),
+    "a push without a time": (
+        ("simulate", "planar2r", "--push", "1", "2", "3"),
+        "--push: found '1 2 3'; expected",
+    ),
     "a file and a goal": (
         ("simulate", "planar2r", "--motion", "x.npz", "--to", "0", "0"),
         "--motion: found --from, --to",
     ),
     "no such file": (("simulate", "planar2r", "--motion", "x.npz"), "x.npz"),
-    "a start of another arm": (("simulate", "planar2r", "--from", "1", "2", "3"), "3 values of --from; expected 2"),
-    "no columns": (("simulate", "planar2r", "--motion", "x.mat", "--columns", "tout"), "--columns: found 'tout'"),
-    "a rate of 0": (("simulate", "planar2r", "--rate", "0"), "rate is 0.0; expected a positive number"),
+    "a start of another arm": (
+        ("simulate", "planar2r", "--from", "1", "2", "3"),
+        "3 values of --from; expected 2",
+    ),
+    "no columns": (
+        ("simulate", "planar2r", "--motion", "x.mat", "--columns", "tout"),
+        "--columns: found 'tout'",
+    ),
+    "a rate of 0": (
+        ("simulate", "planar2r", "--rate", "0"),
+        "rate is 0.0; expected a positive number",
+    ),
     "a bandwidth of 0": (("simulate", "planar2r", "--bandwidth", "0"), "bandwidth is 0.0"),
-    "noise in continuous time": (("simulate", "planar2r", "--continuous", "--noise", "1e-3"), "expected a rate in Hz"),
-    "a result of another suffix": (("simulate", "planar2r", "-o", "run.txt"), "run.txt: ends in '.txt'; expected .npz"),
+    "noise in continuous time": (
+        ("simulate", "planar2r", "--continuous", "--noise", "1e-3"),
+        "expected a rate in Hz",
+    ),
+    "a result of another suffix": (
+        ("simulate", "planar2r", "-o", "run.txt"),
+        "run.txt: ends in '.txt'; expected .npz",
+    ),
     "a file for a folder": (
         ("simulate", "planar2r", "-o", "/dev/null/run.npz"),
         "/dev/null: a file; expected a folder",
@@ -227,8 +289,10 @@ def test_a_motion_brings_its_payload(dhkit, tmp_path):
     status, out, err = dhkit("simulate", "planar2r", "--motion", path, "--json")
     assert status == 0, err
     known = json.loads(out)["peak_error_rad"]
-    assert json.loads(dhkit("simulate", "planar2r", "--motion", path, "--payload", "1.2 @ 0.02 0 0", "--json")[1])[
-        "peak_error_rad"
-    ] == pytest.approx(known)
-    unknown = json.loads(dhkit("simulate", "planar2r", "--motion", path, "--unmodelled", "--json")[1])
+    assert json.loads(
+        dhkit("simulate", "planar2r", "--motion", path, "--payload", "1.2 @ 0.02 0 0", "--json")[1]
+    )["peak_error_rad"] == pytest.approx(known)
+    unknown = json.loads(
+        dhkit("simulate", "planar2r", "--motion", path, "--unmodelled", "--json")[1]
+    )
     assert max(unknown["peak_error_rad"]) > 10 * max(known)

@@ -36,7 +36,9 @@ COMMANDS = {name: load_command(name) for name in app_module.COMMANDS}
     ],
 )
 def test_letters_that_a_pipe_lacks_are_replaced(encoding, command, words, monkeypatch):
-    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2))
+    out, err = (
+        io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2)
+    )
     monkeypatch.setattr(sys, "stdout", out)
     monkeypatch.setattr(sys, "stderr", err)
     with pytest.raises(SystemExit) as ended:
@@ -57,15 +59,21 @@ def test_letters_that_a_pipe_of_a_process_lacks_are_replaced():
 
 
 def test_letters_become_plain_ones():
-    assert "".join(map(_plain, "θ α Θ → ² ½ é ─│ 90° 関")) == "theta alpha Theta -> 2 12 e -| 90 deg ?"
+    assert (
+        "".join(map(_plain, "θ α Θ → ² ½ é ─│ 90° 関")) == "theta alpha Theta -> 2 12 e -| 90 deg ?"
+    )
 
 
 HOSTILE = "\x1b]0;title\x07\x1b[2J\x9b1m\u202egnp."
 """A title, a cleared screen, bold by a C1 character, and text that runs from right to left."""
 
 
-@pytest.mark.parametrize("words", [["check", "planar2r", "{}.py"], ["info", "{}.toml"], ["info", "{}.urdf"]])
-def test_names_of_files_reach_a_terminal_without_control_characters(words, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    "words", [["check", "planar2r", "{}.py"], ["info", "{}.toml"], ["info", "{}.urdf"]]
+)
+def test_names_of_files_reach_a_terminal_without_control_characters(
+    words, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     names = [word.format(HOSTILE) for word in words]
     Path(names[-1]).write_text("nonsense")
@@ -91,7 +99,9 @@ def test_a_named_pipe_is_written_through_and_stays(command, tmp_path):
     read = []
     reader = threading.Thread(target=lambda: read.append(pipe.read_text()))
     reader.start()
-    subprocess.run([sys.executable, "-m", "dhkit", *command.split(), "-o", str(pipe)], check=True, timeout=60)
+    subprocess.run(
+        [sys.executable, "-m", "dhkit", *command.split(), "-o", str(pipe)], check=True, timeout=60
+    )
     reader.join(10)
     assert len(read[0]) > 100
     assert pipe.is_fifo()
@@ -122,7 +132,9 @@ def test_a_device_is_written_through():
 
 
 def test_summaries_are_whole():
-    done = subprocess.run([sys.executable, "-m", "dhkit", "--help"], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "dhkit", "--help"], capture_output=True, text=True, check=True
+    )
     listed = " ".join(done.stdout.split("Commands:")[1].split())
     assert "..." not in listed
     for name, command in COMMANDS.items():
@@ -134,7 +146,13 @@ def test_options_of_one_meaning_have_one_name():
         for option in command.params:
             if option.name == "output":
                 assert option.opts == ["--output", "-o"], name
-            assert not set(option.opts) & {"--out", "--outfile", "--file", "--deg", "--n-samples"}, name
+            assert not set(option.opts) & {
+                "--out",
+                "--outfile",
+                "--file",
+                "--deg",
+                "--n-samples",
+            }, name
             if option.name == "form":
                 assert option.opts == ["--format"], name
             if "--json" in option.opts:
@@ -195,7 +213,11 @@ SHELL = f"'{sys.executable}' -m dhkit"
 @pytest.mark.slow
 def test_streams_that_take_nothing_lose_nothing_else(command, status, words):
     done = subprocess.run(
-        ["/bin/sh", "-c", f"{SHELL} {command}"], capture_output=True, text=True, timeout=60, check=False
+        ["/bin/sh", "-c", f"{SHELL} {command}"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.returncode == status
     assert words in done.stdout
@@ -207,7 +229,9 @@ def test_streams_that_take_nothing_lose_nothing_else(command, status, words):
 @pytest.mark.parametrize("command", ["robots", "robots --json", "info puma560"])
 @pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_answer_of_no(command):
-    first = subprocess.Popen([sys.executable, "-m", "dhkit", *command.split()], stdout=subprocess.PIPE)
+    first = subprocess.Popen(
+        [sys.executable, "-m", "dhkit", *command.split()], stdout=subprocess.PIPE
+    )
     first.stdout.close()
     assert first.wait(60) == 141
 

@@ -32,7 +32,9 @@ def test_joint_values_and_angles_are_told_in_the_unit_that_was_asked_for(dhkit):
     assert again["q_rad"] == pytest.approx(radians)
     assert np.radians(said["euler_XYZ_deg"]) == pytest.approx(again["euler_XYZ_rad"])
     assert said["xyz_m"] == pytest.approx(arm.fk(radians)[:3, 3])
-    found = json.loads(dhkit("ik", "stanford", "--like", *q, "--near", *q, "--degrees", "--json")[1])
+    found = json.loads(
+        dhkit("ik", "stanford", "--like", *q, "--near", *q, "--degrees", "--json")[1]
+    )
     nearest = next(branch for branch in found["branches"] if branch["name"] == found["nearest"])
     assert nearest["q_deg"] == pytest.approx(q)
 
@@ -40,13 +42,25 @@ def test_joint_values_and_angles_are_told_in_the_unit_that_was_asked_for(dhkit):
 @pytest.mark.parametrize(
     ("command", "units"),
     [
-        (["info", "stanford"], {"theta_rad", "d_m", "lower_rad", "upper_m", "velocity_m_s", "effort_N_m", "mass_kg"}),
+        (
+            ["info", "stanford"],
+            {"theta_rad", "d_m", "lower_rad", "upper_m", "velocity_m_s", "effort_N_m", "mass_kg"},
+        ),
         (["extract", "example"], {"theta_rad", "d_m", "a_m", "alpha_rad"}),
         (["verify", "planar2r", "--samples", "3"], {"q_rad", "qd_rad_s", "qdd_rad_s2"}),
         (["robots"], {"reach_m"}),
-        (["workspace", "planar2r", "--samples", "200"], {"distances_m", "radii_m", "bounds_m", "q_rad", "xyz_m"}),
-        (["simulate", "planar2r", "--duration", "0.5", "--degrees"], {"duration_s", "peak_error_deg", "tool_error_m"}),
-        (["compare", "planar2r", "--controllers", "pid", "--duration", "0.5"], {"duration_s", "rms_error_rad"}),
+        (
+            ["workspace", "planar2r", "--samples", "200"],
+            {"distances_m", "radii_m", "bounds_m", "q_rad", "xyz_m"},
+        ),
+        (
+            ["simulate", "planar2r", "--duration", "0.5", "--degrees"],
+            {"duration_s", "peak_error_deg", "tool_error_m"},
+        ),
+        (
+            ["compare", "planar2r", "--controllers", "pid", "--duration", "0.5"],
+            {"duration_s", "rms_error_rad"},
+        ),
     ],
 )
 def test_keys_name_their_units(dhkit, command, units, tmp_path, monkeypatch):
@@ -64,7 +78,20 @@ def test_keys_name_their_units(dhkit, command, units, tmp_path, monkeypatch):
 
     found = keys(json.loads(out))
     assert units <= found
-    bare = {"q", "qd", "qdd", "position", "theta", "alpha", "lower", "upper", "duration", "peak_error", "radii", "mass"}
+    bare = {
+        "q",
+        "qd",
+        "qdd",
+        "position",
+        "theta",
+        "alpha",
+        "lower",
+        "upper",
+        "duration",
+        "peak_error",
+        "radii",
+        "mass",
+    }
     assert not found & bare
 
 
@@ -72,11 +99,17 @@ def test_keys_name_their_units(dhkit, command, units, tmp_path, monkeypatch):
     ("arguments", "words"),
     [
         ("plan puma560 --to 300 0 0 0 0 0", "is at 300°, above its upper limit, 160°"),
-        ("plan puma560 --xyz 0.3 0 0.9 --velocity 10 --from 0 0 300 0 0 0", "is at 300°, above its upper limit, 45°"),
+        (
+            "plan puma560 --xyz 0.3 0 0.9 --velocity 10 --from 0 0 300 0 0 0",
+            "is at 300°, above its upper limit, 45°",
+        ),
         ("plan stanford --to 0 0 9 0 0 0", "is at 9 m, above its upper limit, 1.27 m"),
         ("simulate puma560 --from 0 0 0 0 0 0 --to 0 0 0 0 300 0 --duration 1", "100°"),
         ("simulate puma560 --from 0 0 0 0 0 500 --to 0 0 0 0 0 0", "266°"),
-        ("fk puma560 170 0 0 0 0 0", "warning: joint values: waist is 170°, above its upper limit, 160°"),
+        (
+            "fk puma560 170 0 0 0 0 0",
+            "warning: joint values: waist is 170°, above its upper limit, 160°",
+        ),
         ("fk planar2r 100 170", "elbow is 170°, above its upper limit, 160°"),
     ],
 )
@@ -109,7 +142,11 @@ def test_bare_degrees_are_noticed(dhkit, arguments, tmp_path, monkeypatch):
 
 
 def test_values_within_the_limits_and_a_turn_are_not_talked_about(dhkit):
-    for words in ("fk puma560 ready", "fk ur5 6.28 0 0 0 0 0", "ik puma560 --like ready --near ready"):
+    for words in (
+        "fk puma560 ready",
+        "fk ur5 6.28 0 0 0 0 0",
+        "ik puma560 --like ready --near ready",
+    ):
         assert dhkit(*words.split())[2] == ""
 
 
@@ -139,7 +176,10 @@ def test_units_beside_degrees_are_refused(dhkit, value):
 
 def test_comparisons_and_the_names_of_motions_are_in_degrees(dhkit):
     words = ("compare", "planar2r", "--from", "zero", "--controllers", "pd", "--duration", "1")
-    degrees, radians = (dhkit(*words, "--to", *to)[1] for to in (("20", "20", "--degrees"), ("0.349066", "0.349066")))
+    degrees, radians = (
+        dhkit(*words, "--to", *to)[1]
+        for to in (("20", "20", "--degrees"), ("0.349066", "0.349066"))
+    )
     assert "to (20°, 20°)" in degrees and "largest error [°]" in degrees
     assert "to (0.3491 rad, 0.3491 rad)" in radians and "largest error [rad]" in radians
     errors = [float(text.split("\npd")[1].split()[0]) for text in (degrees, radians)]

@@ -32,7 +32,10 @@ def test_it_says_what_is_reached_and_writes_a_picture_and_a_page(dhkit, tmp_path
     assert "area reached: about 2." in out
     assert "distance from axis 1 [m]" in out
     assert "best 0.2 with the tool at" in out
-    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == ["workspace.html", "workspace.png"]
+    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == [
+        "workspace.html",
+        "workspace.png",
+    ]
     with Image.open(tmp_path / "here" / "workspace.png") as picture:
         assert len(np.unique(np.asarray(picture.convert("L")))) > 50
     assert (tmp_path / "here" / "workspace.html").stat().st_size < 2_000_000
@@ -48,7 +51,9 @@ def test_machines_are_told_the_same_as_python(dhkit, name):
     assert facts["radii_m"] == list(space.radii)
     assert facts["best"]["q_rad"] == space.best.tolist()
     assert facts["best"]["manipulability"] == space.manipulability.max()
-    assert (facts["estimate"] or {}).get("value") == (space.estimate.value if space.estimate else None)
+    assert (facts["estimate"] or {}).get("value") == (
+        space.estimate.value if space.estimate else None
+    )
     assert facts["files"] == [f"out/{name}/workspace.png", f"out/{name}/workspace.html"]
 
 
@@ -72,12 +77,16 @@ def test_the_page_shows_the_arm_among_its_points(dhkit, tmp_path, chromium):
         page.open(f"file://{tmp_path}/out/puma560/workspace.html")
         with_points = page.screenshot()
         layers = "Object.entries(dhkit.stage.overlays.layers)"
-        filled = page.evaluate(f"{layers}.filter(([, layer]) => layer.group.children.length).map(([name]) => name)")
+        filled = page.evaluate(
+            f"{layers}.filter(([, layer]) => layer.group.children.length).map(([name]) => name)"
+        )
         assert filled == ["points", "ellipsoids"]
         page.press("o")
         without = page.screenshot()
         assert np.any(np.abs(with_points - without) > 20, axis=-1).sum() > 3_000
-        assert [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))] == []
+        assert [
+            url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))
+        ] == []
         assert page.errors == []
     finally:
         page.close()

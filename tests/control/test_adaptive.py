@@ -34,7 +34,10 @@ ADAPTING = ["planar2r", "puma560", "panda", "stanford"]
 def closed_motion(arm):
     """Return a motion that repeats itself every 4 s, in which the joints move at 1, 2 and 3 turns a round."""
     numbers = arm.description.numbers
-    lower, upper = np.nan_to_num(numbers.lower, neginf=-1.5), np.nan_to_num(numbers.upper, posinf=1.5)
+    lower, upper = (
+        np.nan_to_num(numbers.lower, neginf=-1.5),
+        np.nan_to_num(numbers.upper, posinf=1.5),
+    )
     centre = (lower + upper) / 2
     frequency = np.array([1, 2, 3, 2, 1, 3, 2])[: arm.n] / ROUND
     return Sine(centre, np.minimum(0.7, (upper - lower) / 4), frequency, 2.0 * np.arange(arm.n))
@@ -53,8 +56,15 @@ def gap_of_the_regressor(description, samples):
     Y = velocity_regressor(description, q, qd, qd_r, qdd_r)
     tau = Y @ theta + qdd_r @ description.numbers.drive_inertia
     M, C = mass_matrix(description, q), coriolis_matrix(description, q, qd)
-    expected = np.einsum("kij,kj->ki", M, qdd_r) + np.einsum("kij,kj->ki", C, qd_r) + gravity_torque(description, q)
-    terms = np.einsum("kij,j->ki", np.abs(Y), np.abs(theta)).max() + np.abs(description.numbers.armature * qdd_r).max()
+    expected = (
+        np.einsum("kij,kj->ki", M, qdd_r)
+        + np.einsum("kij,kj->ki", C, qd_r)
+        + gravity_torque(description, q)
+    )
+    terms = (
+        np.einsum("kij,j->ki", np.abs(Y), np.abs(theta)).max()
+        + np.abs(description.numbers.armature * qdd_r).max()
+    )
     return np.abs(tau - expected).max() / terms
 
 
@@ -62,14 +72,20 @@ def gap_of_the_regressor(description, samples):
 @pytest.mark.slow
 def test_the_regressor_gives_the_terms_of_the_equation_of_motion(name, law):
     law.holds(
-        "Y theta against M qdd_r + C qd_r + g", gap_of_the_regressor(library_robot(name), law.samples(500)), ROUNDING
+        "Y theta against M qdd_r + C qd_r + g",
+        gap_of_the_regressor(library_robot(name), law.samples(500)),
+        ROUNDING,
     )
 
 
 @given(arms(least=1, most=6))
 @pytest.mark.slow
 def test_the_regressor_of_any_arm(law, description):
-    law.holds("Y theta against M qdd_r + C qd_r + g", gap_of_the_regressor(description, law.samples(100)), ROUNDING)
+    law.holds(
+        "Y theta against M qdd_r + C qd_r + g",
+        gap_of_the_regressor(description, law.samples(100)),
+        ROUNDING,
+    )
 
 
 @pytest.mark.slow
@@ -79,13 +95,17 @@ def test_the_regressor_is_that_of_inverse_dynamics_polarized(law, description):
     qd_r, still = random_motions(description, len(q), seed=1).qd, np.zeros_like(q)
     Y = velocity_regressor(description, q, qd, qd_r, qdd_r)
     # C(q, a) b = (h(a + b) - h(a - b)) / 4, h(a) = C(q, a) a: the terms without rates cancel.
-    squares = regressor(description, q, qd + qd_r, still) - regressor(description, q, qd - qd_r, still)
+    squares = regressor(description, q, qd + qd_r, still) - regressor(
+        description, q, qd - qd_r, still
+    )
     expected = regressor(description, q, still, qdd_r) + squares / 4
     size = max(np.abs(squares).max(), np.abs(expected).max())
     law.holds("regressor against polarization", np.abs(Y - expected).max() / size, ROUNDING)
 
 
-@pytest.mark.parametrize("name", ["planar2r", "cart_pendulum", "puma560", "panda", "stanford", "pan_tilt"])
+@pytest.mark.parametrize(
+    "name", ["planar2r", "cart_pendulum", "puma560", "panda", "stanford", "pan_tilt"]
+)
 def test_base_parameters_give_the_same_torques(name, law):
     description = library_robot(name)
     grouping = parameter_grouping(description)
@@ -122,7 +142,9 @@ def test_the_error_of_the_fourth_round_is_a_fifth_of_the_first(name, law):
     """From half the true masses and inertias, called at 1 kHz."""
     law.samples(1)
     arm = Arm.load(name)
-    run = arm.simulate(Adaptive.tuned(arm, masses=0.5), closed_motion(arm), 4 * ROUND, restitution=None)
+    run = arm.simulate(
+        Adaptive.tuned(arm, masses=0.5), closed_motion(arm), 4 * ROUND, restitution=None
+    )
     assert not run.saturated.any()
     error = np.linalg.norm(run.q - run.reference_q, axis=1)[:-1].reshape(4, -1)
     peak, rms = error.max(axis=1), np.sqrt(np.mean(error**2, axis=1))
@@ -152,27 +174,48 @@ def test_the_lyapunov_function_never_rises(name, law):
     x = solve_ivp(rates, (0, ROUND), begin, "DOP853", t, rtol=1e-11, atol=1e-12).y.T
     true = parameter_grouping(description).matrix @ inertial_parameters(description)
     V = np.array(
-        [controller.lyapunov(y[:n], y[n : 2 * n], asked(s), y[2 * n :], true) for s, y in zip(t, x, strict=True)]
+        [
+            controller.lyapunov(y[:n], y[n : 2 * n], asked(s), y[2 * n :], true)
+            for s, y in zip(t, x, strict=True)
+        ]
     )
     law.holds("rise between samples, over its start", np.diff(V).max() / V[0], 1e-9)
     assert 0 < V[-1] < 0.5 * V[0]
     s = np.array(
-        [asked(u).qd - y[n : 2 * n] + controller.decay * (asked(u).q - y[:n]) for u, y in zip(t, x, strict=True)]
+        [
+            asked(u).qd - y[n : 2 * n] + controller.decay * (asked(u).q - y[:n])
+            for u, y in zip(t, x, strict=True)
+        ]
     )
     lost = np.einsum("ki,i,ki->k", s, controller.kd, s)
-    law.holds("V lost over the integral of s^T K_D s, from 1", abs((V[0] - V[-1]) / np.trapezoid(lost, t) - 1), 1e-4)
+    law.holds(
+        "V lost over the integral of s^T K_D s, from 1",
+        abs((V[0] - V[-1]) / np.trapezoid(lost, t) - 1),
+        1e-4,
+    )
 
 
 def test_with_the_right_parameters_the_error_decays_as_its_poles_say(law):
     law.samples(1)
     arm = Arm.load("puma560")
     controller = Adaptive.tuned(arm, bandwidth=15.0, damping=1.25, adaptation=1e-9)
-    assert np.allclose(controller.decay, 7.5) and np.allclose(controller.kd, 30.0 * effective_inertia(arm.description))
+    assert np.allclose(controller.decay, 7.5) and np.allclose(
+        controller.kd, 30.0 * effective_inertia(arm.description)
+    )
     reference = closed_motion(arm)
     q, qd = start(reference)
     # On s = 0 the error decays with Lambda alone.
     e = np.array([0.01, -0.02, 0.01, 0.02, -0.01, 0.03])
-    run = arm.simulate(controller, reference, 0.2, q - e, qd + 7.5 * e, rate=8000, restitution=None, saturation=False)
+    run = arm.simulate(
+        controller,
+        reference,
+        0.2,
+        q - e,
+        qd + 7.5 * e,
+        rate=8000,
+        restitution=None,
+        saturation=False,
+    )
     decayed = run.reference_q[-1] - run.q[-1]
     law.holds("error after 0.2 s, rad", np.abs(decayed - e * np.exp(-1.5)).max(), 2e-5)
 
@@ -195,19 +238,46 @@ def test_it_begins_anew_with_every_run():
 PLANAR = Arm.load("planar2r")
 BAD = {
     "no arm": (lambda: Adaptive.tuned("puma560"), "found str; expected an arm"),
-    "a negative gain": (lambda: Adaptive(PLANAR, -1.0, 1.0, 1.0), "decay is -1.0; expected finite numbers"),
-    "gains of another arm": (lambda: Adaptive(PLANAR, 1.0, np.ones(6), 1.0), r"kd has shape \(6,\)"),
-    "no adaptation": (lambda: Adaptive(PLANAR, 1, 1, 0.0), "adaptation is not symmetric and positive definite"),
-    "an adaptation of another arm": (lambda: Adaptive(PLANAR, 1, 1, np.ones(36)), r"adaptation has shape \(36,\)"),
-    "an adaptation of NaN": (lambda: Adaptive(PLANAR, 1, 1, np.nan), r"adaptation has shape \(\); .* finite"),
-    "an adaptation that is a word": (lambda: Adaptive(PLANAR, 1, 1, "fast"), "adaptation: found 'fast'"),
-    "a lopsided matrix": (lambda: Adaptive(PLANAR, 1, 1, np.triu(np.ones((6, 6)))), "not symmetric"),
+    "a negative gain": (
+        lambda: Adaptive(PLANAR, -1.0, 1.0, 1.0),
+        "decay is -1.0; expected finite numbers",
+    ),
+    "gains of another arm": (
+        lambda: Adaptive(PLANAR, 1.0, np.ones(6), 1.0),
+        r"kd has shape \(6,\)",
+    ),
+    "no adaptation": (
+        lambda: Adaptive(PLANAR, 1, 1, 0.0),
+        "adaptation is not symmetric and positive definite",
+    ),
+    "an adaptation of another arm": (
+        lambda: Adaptive(PLANAR, 1, 1, np.ones(36)),
+        r"adaptation has shape \(36,\)",
+    ),
+    "an adaptation of NaN": (
+        lambda: Adaptive(PLANAR, 1, 1, np.nan),
+        r"adaptation has shape \(\); .* finite",
+    ),
+    "an adaptation that is a word": (
+        lambda: Adaptive(PLANAR, 1, 1, "fast"),
+        "adaptation: found 'fast'",
+    ),
+    "a lopsided matrix": (
+        lambda: Adaptive(PLANAR, 1, 1, np.triu(np.ones((6, 6)))),
+        "not symmetric",
+    ),
     "an estimate of another arm": (
         lambda: Adaptive(PLANAR, 1, 1, 1, estimate=np.ones(36)),
         r"estimate has shape \(36,\); expected \(6,\) finite base parameters",
     ),
-    "no masses": (lambda: Adaptive(PLANAR, 1, 1, 1, masses=0), "masses is 0; expected a positive number"),
-    "a damping below 1": (lambda: Adaptive.tuned(PLANAR, damping=0.7), "damping is 0.7; expected 1 or more"),
+    "no masses": (
+        lambda: Adaptive(PLANAR, 1, 1, 1, masses=0),
+        "masses is 0; expected a positive number",
+    ),
+    "a damping below 1": (
+        lambda: Adaptive.tuned(PLANAR, damping=0.7),
+        "damping is 0.7; expected 1 or more",
+    ),
     "a bandwidth of 0": (lambda: Adaptive.tuned(PLANAR, bandwidth=0), "bandwidth is 0"),
     "a rate of 0": (lambda: Adaptive.tuned(PLANAR, adaptation=0.0), "adaptation is 0.0"),
 }

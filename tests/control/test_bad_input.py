@@ -5,7 +5,17 @@ import re
 import numpy as np
 import pytest
 
-from dhkit import LQR, PID, Arm, ComputedTorque, FrictionCompensation, Push, SimulationError, Sine, Step
+from dhkit import (
+    LQR,
+    PID,
+    Arm,
+    ComputedTorque,
+    FrictionCompensation,
+    Push,
+    SimulationError,
+    Sine,
+    Step,
+)
 from dhkit.control import Plant
 from dhkit.errors import DescriptionError
 
@@ -22,13 +32,22 @@ BAD = {
     "a rate of 0": (lambda: run(rate=0), r"rate is 0; expected a positive number"),
     "a negative rate": (lambda: run(rate=-1.0), "rate is -1.0"),
     "a rate that is not a number": (lambda: run(rate=np.nan), "rate is nan"),
-    "a plant that is slower": (lambda: run(plant_rate=100), "plant_rate is 100; expected a multiple of rate, 1000"),
+    "a plant that is slower": (
+        lambda: run(plant_rate=100),
+        "plant_rate is 100; expected a multiple of rate, 1000",
+    ),
     "a plant that does not fit": (lambda: run(plant_rate=1500), "expected a multiple of rate"),
     "no end": (lambda: run(duration=None), "duration is not given, and the reference has no end"),
-    "a duration of years": (lambda: run(duration=1e9), r"1e\+09 s at 1000 Hz are 1e\+12 steps; expected at most"),
+    "a duration of years": (
+        lambda: run(duration=1e9),
+        r"1e\+09 s at 1000 Hz are 1e\+12 steps; expected at most",
+    ),
     "an endless duration": (lambda: run(duration=np.inf), "duration is inf"),
     "a duration of 0": (lambda: run(duration=0), "duration is 0"),
-    "a state that is not a number": (lambda: run(q0=[0, np.nan]), "q0 has values that are not finite"),
+    "a state that is not a number": (
+        lambda: run(q0=[0, np.nan]),
+        "q0 has values that are not finite",
+    ),
     "a state of another arm": (lambda: run(q0=np.zeros(6)), r"q0 has shape \(6,\)"),
     "rates of another arm": (lambda: run(qd0=np.zeros(3)), r"qd0 has shape \(3,\)"),
     "a batch of states": (lambda: run(q0=np.zeros((3, 2))), r"q0 has shape \(3, 2\)"),
@@ -45,14 +64,26 @@ BAD = {
         r"reference's q has shape \(11, 6\)",
     ),
     "a sine without end": (lambda: run(reference=Sine([0, 0], [np.inf, 1])), "Sine: amplitude is"),
-    "a plant of other joints": (lambda: run(plant=OTHER), "the plant has joints RRRRRR; expected RR"),
-    "a stop that gives energy": (lambda: run(restitution=1.5), "restitution is 1.5; expected 0 to 1"),
+    "a plant of other joints": (
+        lambda: run(plant=OTHER),
+        "the plant has joints RRRRRR; expected RR",
+    ),
+    "a stop that gives energy": (
+        lambda: run(restitution=1.5),
+        "restitution is 1.5; expected 0 to 1",
+    ),
     "a stop that takes more than there is": (lambda: run(restitution=-0.1), "restitution is -0.1"),
     "friction that is a word": (lambda: run(friction="much"), "friction is 'much'"),
-    "a push on a link that is not there": (lambda: run(pushes=[Push([1, 0, 0], link=5)]), "link is 5; planar2r has 2"),
+    "a push on a link that is not there": (
+        lambda: run(pushes=[Push([1, 0, 0], link=5)]),
+        "link is 5; planar2r has 2",
+    ),
     "a push on link 0": (lambda: Push([1, 0, 0], link=0), "link is 0; expected 1 or more"),
     "a push of two numbers": (lambda: Push([1, 0]), "force is"),
-    "a push that ends before it begins": (lambda: Push([1, 0, 0], begin=2, end=1), "ends at 1 s, before it begins"),
+    "a push that ends before it begins": (
+        lambda: Push([1, 0, 0], begin=2, end=1),
+        "ends at 1 s, before it begins",
+    ),
     "a push without end": (lambda: Push([np.nan, 0, 0]), "three finite numbers"),
     "a negative gain": (lambda: PID(-1.0), r"kp is -1.0; expected finite numbers, 0 or more"),
     "gains of another arm": (lambda: ComputedTorque(ARM, np.ones(6), 1.0), r"kp has shape \(6,\)"),
@@ -66,7 +97,10 @@ BAD = {
     "nothing to compensate around": (lambda: FrictionCompensation(3), "expected a controller"),
     "weights of another arm": (lambda: LQR(ARM, [0, 0], Q=np.ones(3)), r"Q has shape \(3, 3\)"),
     "weights that reward": (lambda: LQR(ARM, [0, 0], R=-np.ones(2)), "R positive definite"),
-    "weights that are not symmetric": (lambda: LQR(ARM, [0, 0], R=[[1, 2], [0, 1]]), "R is not symmetric"),
+    "weights that are not symmetric": (
+        lambda: LQR(ARM, [0, 0], R=[[1, 2], [0, 1]]),
+        "R is not symmetric",
+    ),
     "linear at no number": (lambda: ARM.linearize([0, np.inf]), "q has values that are not finite"),
 }
 
@@ -105,7 +139,10 @@ def stumble():
     ("wrong", "message"),
     [
         (stumble, "the controller raised KeyError at 0.005 s: 'gain'"),
-        (lambda: np.zeros(3), r"the controller returned shape \(3,\) at 0.005 s; expected \(2,\) finite torques"),
+        (
+            lambda: np.zeros(3),
+            r"the controller returned shape \(3,\) at 0.005 s; expected \(2,\) finite torques",
+        ),
         (lambda: [0.0, np.nan], r"returned \[0.0, nan\] at 0.005 s"),
         (lambda: None, r"at 0.005 s"),
         (lambda: "ab", "at 0.005 s"),
@@ -122,7 +159,9 @@ def test_a_wrong_controller_names_the_time_and_keeps_the_run(wrong, message):
 
 def test_a_run_that_leaves_all_bounds_ends():
     with pytest.raises(SimulationError, match="no longer finite") as caught:
-        ARM.simulate(lambda t, q, qd, s: 1e6 * qd + 1e4, duration=5.0, restitution=None, saturation=False)
+        ARM.simulate(
+            lambda t, q, qd, s: 1e6 * qd + 1e4, duration=5.0, restitution=None, saturation=False
+        )
     assert np.isfinite(caught.value.result.q).all()
 
 
@@ -215,6 +254,7 @@ def test_a_smooth_controller_that_diverges_is_not_called_a_relay(name):
     free = ARM.with_limits(lower=[-np.inf] * 2, upper=[np.inf] * 2, torque=[np.inf] * 2)
     error, calls = continuous_failure(free, DIVERGING[name], 5.0, qd0=(0.1, 0.1))
     assert re.search(
-        r"the motion diverges: \w+ moves at .* rad/s at .* expected a controller that is stable", str(error)
+        r"the motion diverges: \w+ moves at .* rad/s at .* expected a controller that is stable",
+        str(error),
     )
     assert calls < 2 * MOST_CALLS

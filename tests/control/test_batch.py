@@ -34,13 +34,23 @@ def same_as_alone(arm, law, controller, reference, q, qd, singles=None, friction
     """Compare a batch with its runs one by one."""
     plant = options.get("plant")
     batch = arm.simulate_batch(
-        controller, reference, 0.05, q, qd, plant=plant, plant_rate=PLANT_RATE, keep="all", friction=friction or None
+        controller,
+        reference,
+        0.05,
+        q,
+        qd,
+        plant=plant,
+        plant_rate=PLANT_RATE,
+        keep="all",
+        friction=friction or None,
     )
     for i in range(len(batch)):
         alone = (singles or [controller] * len(batch))[i]
         run = arm.simulate(
             alone,
-            reference[i] if isinstance(reference, np.ndarray) and reference.ndim == 2 else reference,
+            reference[i]
+            if isinstance(reference, np.ndarray) and reference.ndim == 2
+            else reference,
             q0=q[i] if q.ndim == 2 else q,
             qd0=qd[i] if qd.ndim == 2 else qd,
             plant=plant[i] if isinstance(plant, list) else plant,
@@ -52,7 +62,9 @@ def same_as_alone(arm, law, controller, reference, q, qd, singles=None, friction
         rate, torque, pull = (max(1.0, np.abs(x).max()) for x in (run.qd, run.tau, run.qdd))
         for name in ("q", "qd", "reference_q"):
             difference = np.abs(getattr(batch[i], name) - getattr(run, name)).max()
-            law.holds(f"{name}, batch against single, over the largest rate", difference / rate, AGREE)
+            law.holds(
+                f"{name}, batch against single, over the largest rate", difference / rate, AGREE
+            )
         law.holds("torques over the largest", np.abs(batch[i].tau - run.tau).max() / torque, 1e-9)
         law.holds("qdd over the largest", np.abs(batch[i].qdd - run.qdd).max() / pull, 1e-9)
         assert np.allclose(batch.peak_error[i], run.peak_error, rtol=1e-8, atol=1e-12)
@@ -70,7 +82,12 @@ def test_states_advance_as_each_alone(name, law):
     law.samples(1)
     q, qd = states(arm, 3)
     same_as_alone(arm, law, None, None, q, qd)
-    for controller in (PID.tuned(arm), ComputedTorque.tuned(arm), PDGravity.tuned(arm), FeedForward.tuned(arm)):
+    for controller in (
+        PID.tuned(arm),
+        ComputedTorque.tuned(arm),
+        PDGravity.tuned(arm),
+        FeedForward.tuned(arm),
+    ):
         same_as_alone(arm, law, controller, np.zeros(arm.n), q, qd)
     same_as_alone(arm, law, LQR(arm, np.zeros(arm.n)), np.zeros(arm.n), q, qd)
 
@@ -81,9 +98,19 @@ def test_motions_friction_and_setpoints_of_their_own(law):
     law.samples(1)
     q, qd = states(arm, 3)
     wave = Sine(np.zeros(6), np.full(6, 0.2), 2.0)
-    same_as_alone(arm, law, FrictionCompensation(ComputedTorque.tuned(arm)), wave, q, qd, friction=Friction(0.05))
+    same_as_alone(
+        arm,
+        law,
+        FrictionCompensation(ComputedTorque.tuned(arm)),
+        wave,
+        q,
+        qd,
+        friction=Friction(0.05),
+    )
     # Narrow friction takes more steps than there are control periods.
-    narrow = same_as_alone(arm, law, ComputedTorque.tuned(arm), wave, q, qd, friction=Friction(1e-3))
+    narrow = same_as_alone(
+        arm, law, ComputedTorque.tuned(arm), wave, q, qd, friction=Friction(1e-3)
+    )
     assert narrow[0].audit.friction > 0
     same_as_alone(arm, law, PDGravity.tuned(arm), q + 0.1, q, qd)
 
@@ -95,7 +122,9 @@ def test_gains_of_their_own(law):
     q, qd = np.full(6, 0.1), np.zeros(6)
     gains = np.ones((4, 6)) * w[:, None]
     singles = [ComputedTorque.tuned(arm, bandwidth=x) for x in w]
-    batch = same_as_alone(arm, law, ComputedTorque(arm, gains**2, 2 * gains), np.zeros(6), q, qd, singles)
+    batch = same_as_alone(
+        arm, law, ComputedTorque(arm, gains**2, 2 * gains), np.zeros(6), q, qd, singles
+    )
     assert len(batch) == 4
     singles = [PID(100 * x, 50.0, x) for x in w]
     same_as_alone(arm, law, PID(100 * gains, 50.0, gains), np.zeros(6), q, qd, singles)
@@ -108,9 +137,13 @@ def test_arms_of_their_own(friction, law):
     law.samples(1)
     q, qd = states(arm, 3)
     plants = [arm, arm.with_payload(1.0), arm.with_payload(2.5, com=(0, 0, 0.1))]
-    batch = same_as_alone(arm, law, ComputedTorque.tuned(arm), np.zeros(6), q, qd, friction=friction, plant=plants)
+    batch = same_as_alone(
+        arm, law, ComputedTorque.tuned(arm), np.zeros(6), q, qd, friction=friction, plant=plants
+    )
     assert batch.arm(2).digest == plants[2].description.digest
-    one = same_as_alone(arm, law, ComputedTorque.tuned(arm), np.zeros(6), q, qd, friction=friction, plant=plants[2])
+    one = same_as_alone(
+        arm, law, ComputedTorque.tuned(arm), np.zeros(6), q, qd, friction=friction, plant=plants[2]
+    )
     assert len(one.arms) == 1
 
 
@@ -206,7 +239,9 @@ def test_a_controller_of_ones_own_on_top_of_ours_keeps_its_say():
 def test_blocks_tell_how_far_the_whole_is():
     told = []
     q, _ = states(ARM, 3 * BLOCK)
-    ARM.simulate_batch(PDGravity.tuned(ARM), np.zeros(2), 1.0, q, progress=lambda k, n: told.append((k, n)))
+    ARM.simulate_batch(
+        PDGravity.tuned(ARM), np.zeros(2), 1.0, q, progress=lambda k, n: told.append((k, n))
+    )
     assert told == [(333, 1000), (666, 1000), (1000, 1000)]
 
     def stop(k, n):
@@ -214,7 +249,9 @@ def test_blocks_tell_how_far_the_whole_is():
 
     for threads in (1, 2):
         with pytest.raises(KeyboardInterrupt):
-            ARM.simulate_batch(PDGravity.tuned(ARM), np.zeros(2), 1.0, q, threads=threads, progress=stop)
+            ARM.simulate_batch(
+                PDGravity.tuned(ARM), np.zeros(2), 1.0, q, threads=threads, progress=stop
+            )
 
 
 ARM = Arm.load("planar2r")
@@ -222,7 +259,8 @@ ARM = Arm.load("planar2r")
 
 def run(**options):
     return ARM.simulate_batch(
-        **{"controller": ComputedTorque.tuned(ARM), "q0": np.zeros((3, 2)), "duration": 0.01} | options
+        **{"controller": ComputedTorque.tuned(ARM), "q0": np.zeros((3, 2)), "duration": 0.01}
+        | options
     )
 
 
@@ -232,17 +270,32 @@ BAD = {
         "OperationalSpace controls one arm at a time; expected another controller, or simulate\\(\\) for each arm",
     ),
     "friction that is a step": ({"friction": Friction()}, "a batch has no stiction"),
-    "something else to keep": ({"keep": "some"}, "keep is 'some'; expected one of final, errors, all"),
+    "something else to keep": (
+        {"keep": "some"},
+        "keep is 'some'; expected one of final, errors, all",
+    ),
     "batches that do not fit": ({"qd0": np.zeros((4, 2))}, "batches of 3, 4; expected one"),
-    "gains that do not fit": ({"controller": PID(np.ones((5, 2)))}, "batches of 3, 5; expected one"),
+    "gains that do not fit": (
+        {"controller": PID(np.ones((5, 2)))},
+        "batches of 3, 5; expected one",
+    ),
     "states of another arm": ({"q0": np.zeros((3, 6))}, r"q0 has shape \(3, 6\)"),
-    "states on a grid": ({"q0": np.zeros((3, 3, 2))}, r"q0 has shape \(3, 3, 2\); expected \(2,\) or \(B, 2\)"),
+    "states on a grid": (
+        {"q0": np.zeros((3, 3, 2))},
+        r"q0 has shape \(3, 3, 2\); expected \(2,\) or \(B, 2\)",
+    ),
     "a state that is not a number": ({"q0": np.full((3, 2), np.nan)}, "finite"),
-    "a plant of other joints": ({"plant": Arm.load("puma560")}, "a plant has joints RRRRRR; expected RR"),
+    "a plant of other joints": (
+        {"plant": Arm.load("puma560")},
+        "a plant has joints RRRRRR; expected RR",
+    ),
     "no end": ({"duration": None}, "duration is not given"),
     "a rate of 0": ({"rate": 0}, "rate is 0"),
     "no threads": ({"threads": 0}, "threads is 0"),
-    "more than fits": ({"keep": "all", "duration": 9000.0, "q0": np.zeros((1000, 2))}, "all states are 576 GB"),
+    "more than fits": (
+        {"keep": "all", "duration": 9000.0, "q0": np.zeros((1000, 2))},
+        "all states are 576 GB",
+    ),
     "a reference that is a word": ({"reference": "raedy"}, "no configuration 'raedy'"),
 }
 
@@ -258,9 +311,15 @@ def test_it_is_refused_in_one_line(name):
 @pytest.mark.parametrize(
     ("controller", "message"),
     [
-        (lambda t, q, qd, s: np.zeros((3, 5)), r"returned ndarray of shape \(3, 5\) at 0 s; expected torques \(3, 2\)"),
+        (
+            lambda t, q, qd, s: np.zeros((3, 5)),
+            r"returned ndarray of shape \(3, 5\) at 0 s; expected torques \(3, 2\)",
+        ),
         (lambda t, q, qd, s: "much", "returned str"),
-        (lambda t, q, qd, s: np.array([[0, 0], [0, np.nan], [0, 0]]), "torques of run 1 are not finite at 0 s"),
+        (
+            lambda t, q, qd, s: np.array([[0, 0], [0, np.nan], [0, 0]]),
+            "torques of run 1 are not finite at 0 s",
+        ),
         (lambda t, q, qd, s: q.fill(0), "raised ValueError at 0 s"),
         (lambda t, q, qd, s: 1 / 0, "raised ZeroDivisionError at 0 s"),
     ],

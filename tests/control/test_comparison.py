@@ -6,7 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.controllers import BEGIN, COMPENSATED, END, HEADINGS, Errors, cases, errors_of, table, with_tables
+from benchmarks.controllers import (
+    BEGIN,
+    COMPENSATED,
+    END,
+    HEADINGS,
+    Errors,
+    cases,
+    errors_of,
+    table,
+    with_tables,
+)
 
 from acceptance import only_accepting
 from dhkit.control import CONTROLLERS, PID, Plant, compare, make_controller
@@ -73,7 +83,10 @@ def printed_rows(name):
     """Return the numbers of an arm's table in the page, rows by their controllers' names."""
     page = PAGE.read_text("utf-8").split(BEGIN)[1].split(END)[0]
     lines = page.split(case_of(name).text)[1].strip().split("\n\n")[0].splitlines()
-    assert [cell.strip() for cell in lines[0].strip("|").split("|")] == ["controller", *HEADINGS.values()]
+    assert [cell.strip() for cell in lines[0].strip("|").split("|")] == [
+        "controller",
+        *HEADINGS.values(),
+    ]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
     return {row[0]: row[1:] for row in rows}
 
@@ -85,7 +98,9 @@ def check_row(printed, errors, where):
             assert cell == "", where
             continue
         digit = 10.0 ** (floor(log10(float(cell))) - 1)
-        assert abs(value - float(cell)) <= LAST_DIGIT * digit, f"{where}, {field}: {value:.3g}; the page has {cell}"
+        assert abs(value - float(cell)) <= LAST_DIGIT * digit, (
+            f"{where}, {field}: {value:.3g}; the page has {cell}"
+        )
 
 
 @pytest.mark.slow
@@ -114,7 +129,10 @@ def test_errors_are_as_small_as_controllers_can_make_them(name, law):
     for controller, bounds in BOUNDS[name].items():
         row = errors[controller]
         for kind, seen, bound in zip(
-            ("right model", "unknown payload", "friction"), (row.peak, row.payload, row.friction), bounds, strict=True
+            ("right model", "unknown payload", "friction"),
+            (row.peak, row.payload, row.friction),
+            bounds,
+            strict=True,
         ):
             law.holds(f"{name}: {controller}, {kind}, rad", seen, bound)
     law.holds(f"{name}: {COMPENSATED}, rad", errors[COMPENSATED].friction, COMPENSATED_BOUND[name])
@@ -127,7 +145,9 @@ def test_what_the_page_says_of_the_tables(name):
     for controller in MODEL_BASED:
         assert errors[controller].peak < errors["pid"].peak / 100
         assert errors[controller].payload > 100 * errors[controller].peak
-    assert errors["adaptive"].payload == min(errors[controller].payload for controller in CONTROLLERS)
+    assert errors["adaptive"].payload == min(
+        errors[controller].payload for controller in CONTROLLERS
+    )
     if name != "planar2r":
         assert errors["pid"].payload < errors["computed-torque"].payload
         assert errors["pid"].friction < errors["computed-torque"].friction
@@ -138,10 +158,14 @@ def test_a_page_keeps_what_stands_around_its_tables(monkeypatch):
     some = Errors(0.012345, 1.7e-5, 1e-5, 97.0, 0.1, 7.0)
     monkeypatch.setattr("benchmarks.controllers.errors_of", lambda case, progress: {"pid": some})
     text = with_tables(f"before\n{BEGIN}\nold\n{END}\nafter")
-    assert text.startswith(f"before\n{BEGIN}\n\n**`puma560`**") and text.endswith(f"|\n\n{END}\nafter")
+    assert text.startswith(f"before\n{BEGIN}\n\n**`puma560`**") and text.endswith(
+        f"|\n\n{END}\nafter"
+    )
     assert text.count("| pid | 0.012 | 1.7e-05 | 1.0e-05 | 97 | 0.10 | 7.0 |") == 3
     assert with_tables(text) == text
-    assert table({"x": Errors(None, None, None, None, None, 1.0)}).endswith("| x |  |  |  |  |  | 1.0 |")
+    assert table({"x": Errors(None, None, None, None, None, 1.0)}).endswith(
+        "| x |  |  |  |  |  | 1.0 |"
+    )
     for wrong in ("", BEGIN, f"{END}{BEGIN}", f"{BEGIN}{BEGIN}{END}", f"{BEGIN}{END}{END}"):
         with pytest.raises(ValueError, match="expected one line"):
             with_tables(wrong)
@@ -154,7 +178,9 @@ MOTION = quintic(RODS, [0.0, 0.5], [0.2, 0.7], 0.1)
 def test_controllers_are_compared_on_the_same_motion():
     seen = []
     plant = Plant(RODS, restitution=None)
-    comparison = compare(RODS, MOTION, ("pid", "lqr"), bandwidth=10.0, done=seen.append, plant=plant, rate=500)
+    comparison = compare(
+        RODS, MOTION, ("pid", "lqr"), bandwidth=10.0, done=seen.append, plant=plant, rate=500
+    )
     assert seen == list(comparison.results) == ["pid", "lqr"]
     assert not comparison.failures
     for run in comparison.results.values():
@@ -176,9 +202,15 @@ def test_one_that_fails_is_named_and_the_others_go_on(monkeypatch):
 
 def test_a_controller_by_its_name_has_the_gains_that_were_asked_for():
     made, own = make_controller("pid", RODS, 15.0, 0.8), PID.tuned(RODS, 15.0, 0.8)
-    assert np.array_equal(made.kp, own.kp) and np.array_equal(made.ki, own.ki) and np.array_equal(made.kd, own.kd)
+    assert (
+        np.array_equal(made.kp, own.kp)
+        and np.array_equal(made.ki, own.ki)
+        and np.array_equal(made.kd, own.kd)
+    )
     # An adaptive controller has real poles.
     adaptive = make_controller("adaptive", RODS, 15.0, 0.8)
     assert np.allclose(adaptive.decay, 15.0)
-    with pytest.raises(ValueError, match="controller is 'bang'; expected one of pd, pid, pd-gravity"):
+    with pytest.raises(
+        ValueError, match="controller is 'bang'; expected one of pd, pid, pd-gravity"
+    ):
         make_controller("bang", RODS)

@@ -19,7 +19,9 @@ def by_enumeration(A, b, lower, upper):
             continue
         held = side == 0
         f = np.where(side > 0, upper, np.where(side < 0, lower, 0.0))
-        f[held] = np.linalg.solve(A[np.ix_(held, held)], b[held] - A[np.ix_(held, ~held)] @ f[~held])
+        f[held] = np.linalg.solve(
+            A[np.ix_(held, held)], b[held] - A[np.ix_(held, ~held)] @ f[~held]
+        )
         w = b - A @ f
         scale = ROUNDING * max(1.0, np.abs(w).max(), np.abs(f[held]).max(initial=0.0))
         inside = np.all((lower - scale <= f)[held] & (f <= upper + scale)[held])

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 import dhkit
-from dhkit import LQR, PID, Arm, ComputedTorque, FeedForward, FrictionCompensation, PDGravity, Sensors, Step
+from dhkit import (
+    LQR,
+    PID,
+    Arm,
+    ComputedTorque,
+    FeedForward,
+    FrictionCompensation,
+    PDGravity,
+    Sensors,
+    Step,
+)
 from dhkit.control.gains import effective_inertia
 
 ARM = Arm.load("puma560")
@@ -38,10 +48,23 @@ def test_a_sampled_controller_tends_to_the_continuous_one(law):
     step = Step(np.zeros(6), np.full(6, 0.05), 0.0105)
     for pid in (PID.tuned(ARM, bandwidth=10), PID.tuned(ARM, bandwidth=10, cutoff=300.0)):
         controller = FrictionCompensation(pid, ARM)
-        options = {"reference": step, "duration": 0.2, "q0": np.zeros(6), "restitution": None, "saturation": False}
+        options = {
+            "reference": step,
+            "duration": 0.2,
+            "q0": np.zeros(6),
+            "restitution": None,
+            "saturation": False,
+        }
         exact = ARM.simulate(controller, rate=None, **options).q[-1]
-        slow, fast = (np.abs(ARM.simulate(controller, rate=rate, **options).q[-1] - exact).max() for rate in (2e3, 4e3))
-        law.holds("error at twice the rate over that at the rate, from a half", abs(fast / slow - 0.5), 0.1)
+        slow, fast = (
+            np.abs(ARM.simulate(controller, rate=rate, **options).q[-1] - exact).max()
+            for rate in (2e3, 4e3)
+        )
+        law.holds(
+            "error at twice the rate over that at the rate, from a half",
+            abs(fast / slow - 0.5),
+            0.1,
+        )
 
 
 def test_what_the_sensors_make_of_a_state():
@@ -57,7 +80,10 @@ def test_what_the_sensors_make_of_a_state():
     coarse = Sensors(resolution=1e-3, differences=True)
     run = ARM.simulate(spy, sensors=coarse, **options)
     q, qd = (np.array(x) for x in zip(*seen, strict=True))
-    assert np.allclose(q / 1e-3, np.round(q / 1e-3), atol=1e-9) and np.abs(q - run.q).max() <= 0.5001e-3
+    assert (
+        np.allclose(q / 1e-3, np.round(q / 1e-3), atol=1e-9)
+        and np.abs(q - run.q).max() <= 0.5001e-3
+    )
     assert np.all(qd[0] == 0) and np.allclose(qd[1:], np.diff(q, axis=0) * rate)
     seen.clear()
     run = ARM.simulate(spy, sensors=Sensors(noise=1e-3, rate_noise=0.1, seed=5), **options)
@@ -130,7 +156,9 @@ def test_the_integral_stands_still_in_a_drive_that_gives_all_it_can():
 def test_a_filter_and_a_derivative_of_the_measurement():
     moving = dhkit.control.Setpoint(ARM.description, np.zeros(6), np.ones(6), np.zeros(6))
     assert np.all(PID(0, 0, 2.0)(0.0, np.zeros(6), np.zeros(6), moving) == 2)
-    assert np.all(PID(0, 0, 2.0, derivative="measurement")(0.0, np.zeros(6), np.zeros(6), moving) == 0)
+    assert np.all(
+        PID(0, 0, 2.0, derivative="measurement")(0.0, np.zeros(6), np.zeros(6), moving) == 0
+    )
     slow = PID(0, 0, 1.0, cutoff=10.0)
     slow(0.0, np.zeros(6), np.zeros(6), moving)
     assert np.allclose(slow(0.1, np.zeros(6), np.ones(6), moving), np.exp(-1.0))
@@ -148,7 +176,10 @@ def test_linear_systems_are_those_of_differences(law):
             return np.concatenate([x[6:], ARM.forward_dynamics(x[:6], x[6:], tau + u)])
 
         x, zero = np.concatenate([q, qd]), np.zeros(6)
-        byx = np.stack([(rate(x + d, zero) - rate(x - d, zero)) / (2 * step) for d in step * np.eye(12)], axis=1)
+        byx = np.stack(
+            [(rate(x + d, zero) - rate(x - d, zero)) / (2 * step) for d in step * np.eye(12)],
+            axis=1,
+        )
         byu = np.stack([(rate(x, d) - rate(x, -d)) / (2 * step) for d in step * np.eye(6)], axis=1)
         law.holds("A against differences", np.abs(A - byx).max() / np.abs(A).max(), 1e-7)
         law.holds("B against differences", np.abs(B - byu).max() / np.abs(B).max(), 1e-7)
@@ -158,18 +189,27 @@ def test_a_regulator_decays_as_its_slowest_eigenvalue(law):
     law.samples(1)
     q = np.array([0.2, 0.5, -0.8, 0.3, 0.6, 0.1])
     lqr = LQR(ARM, q)
-    residual = lqr.A.T @ lqr.P + lqr.P @ lqr.A - lqr.P @ lqr.B @ np.linalg.solve(lqr.R, lqr.B.T @ lqr.P) + lqr.Q
+    residual = (
+        lqr.A.T @ lqr.P
+        + lqr.P @ lqr.A
+        - lqr.P @ lqr.B @ np.linalg.solve(lqr.R, lqr.B.T @ lqr.P)
+        + lqr.Q
+    )
     law.holds("Riccati's residual over Q", np.abs(residual).max(), 1e-9)
     values, vectors = np.linalg.eig(lqr.A - lqr.B @ lqr.K)
     slowest = int(np.argmax(values.real))
     assert values.real[slowest] < 0
     offset = np.real(vectors[:, slowest])
     offset *= 1e-4 / np.abs(offset).max()
-    run = ARM.simulate(lqr, q, 1.0, q + offset[:6], offset[6:], rate=4000, restitution=None, saturation=False)
+    run = ARM.simulate(
+        lqr, q, 1.0, q + offset[:6], offset[6:], rate=4000, restitution=None, saturation=False
+    )
     if abs(values[slowest].imag) < 1e-9:
         size = np.linalg.norm(run.q - q, axis=1)
         decay = np.log(size[-1] / size[0]) / run.t[-1]
-        law.holds("decay over the slowest eigenvalue, from 1", abs(decay / values.real[slowest] - 1), 0.02)
+        law.holds(
+            "decay over the slowest eigenvalue, from 1", abs(decay / values.real[slowest] - 1), 0.02
+        )
 
 
 def test_ones_own_controller():

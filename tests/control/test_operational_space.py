@@ -42,11 +42,15 @@ def test_it_passes_a_wrist_singularity(law):
     law.samples(1)
     first, last = NOMINAL.copy(), NOMINAL + np.array([0.3, 0.2, -0.2, 0.5, 0.0, 0.0])
     first[4], last[4] = 0.6, -0.5
-    run = PUMA.simulate(OperationalSpace.tuned(PUMA), PUMA.quintic(first, last, duration=2.0), restitution=None)
+    run = PUMA.simulate(
+        OperationalSpace.tuned(PUMA), PUMA.quintic(first, last, duration=2.0), restitution=None
+    )
     position, rotation = tool_errors(run, PUMA)
     law.holds("m, through a wrist singularity", position, 3e-6)
     law.holds("rad, through a wrist singularity", rotation, 2e-5)
-    ahead = PUMA.inverse_dynamics(run.reference_q, run.reference_qd, PUMA.quintic(first, last, duration=2.0).qdd(run.t))
+    ahead = PUMA.inverse_dynamics(
+        run.reference_q, run.reference_qd, PUMA.quintic(first, last, duration=2.0).qdd(run.t)
+    )
     law.holds("N m, torques against those of the motion", np.abs(run.tau_asked - ahead).max(), 0.01)
 
 
@@ -87,7 +91,12 @@ def test_it_comes_to_rest_at_a_singularity(offset, law):
         ("cobra600", [0.1, 0.6, 0.05, 0.2], [0.6, 1.0, 0.1, 0.9], 2e-5),
         ("stanford", [0.1, 0.6, 0.4, 0.2, 0.8, 0.1], [0.5, 1.0, 0.5, 0.6, 1.2, 0.5], 2e-5),
         ("cart_pendulum", [0.1, 0.3], [0.3, 0.6], 2e-5),
-        ("panda", [0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8], [0.3, -0.6, 0.3, -1.9, -0.3, 2.3, 1.1], 2e-5),
+        (
+            "panda",
+            [0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8],
+            [0.3, -0.6, 0.3, -1.9, -0.3, 2.3, 1.1],
+            2e-5,
+        ),
     ],
 )
 @pytest.mark.slow
@@ -95,7 +104,9 @@ def test_arms_of_other_joints_follow(name, first, last, required, law):
     """The bounds are at least twice what was seen; joints of less inertia are further off."""
     law.samples(1)
     arm = Arm.load(name)
-    run = arm.simulate(OperationalSpace.tuned(arm), arm.quintic(first, last, duration=2.0), restitution=None)
+    run = arm.simulate(
+        OperationalSpace.tuned(arm), arm.quintic(first, last, duration=2.0), restitution=None
+    )
     law.holds("m and rad, tool", max(tool_errors(run, arm)), required)
     law.holds("rad and m, joints", np.abs(run.q - run.reference_q).max(), required)
     assert not run.saturated.any()
@@ -151,7 +162,8 @@ def test_setpoints_know_how_the_tool_moves(law):
     step = 1e-5
     for t in np.linspace(0.1, 1.9, law.samples(50)):
         before, at, after = (
-            Setpoint(PUMA.description, motion.q(s), motion.qd(s), motion.qdd(s)) for s in (t - step, t, t + step)
+            Setpoint(PUMA.description, motion.q(s), motion.qd(s), motion.qdd(s))
+            for s in (t - step, t, t + step)
         )
         moved = pose_error(before.T, after.T) / (2 * step)
         law.holds("twist against differences", np.abs(at.twist - moved).max(), 1e-8)
@@ -166,13 +178,22 @@ BAD = {
         lambda: OperationalSpace(PUMA, np.ones(3), 1),
         r"kp has shape \(3,\); expected a number, or \(6,\)",
     ),
-    "gains that are words": (lambda: OperationalSpace(PUMA, "stiff", 1), "kp: found 'stiff'; expected numbers"),
+    "gains that are words": (
+        lambda: OperationalSpace(PUMA, "stiff", 1),
+        "kp: found 'stiff'; expected numbers",
+    ),
     "posture of another arm": (
         lambda: OperationalSpace(PUMA, 1, 1, posture_kp=np.ones(7)),
         r"posture_kp has shape \(7,\)",
     ),
-    "no direction": (lambda: OperationalSpace(PUMA, 1, 1, directions=[0] * 6), "directions is .* one of them True"),
-    "three directions": (lambda: OperationalSpace(PUMA, 1, 1, directions=[1, 1, 1]), "expected six of True and False"),
+    "no direction": (
+        lambda: OperationalSpace(PUMA, 1, 1, directions=[0] * 6),
+        "directions is .* one of them True",
+    ),
+    "three directions": (
+        lambda: OperationalSpace(PUMA, 1, 1, directions=[1, 1, 1]),
+        "expected six of True and False",
+    ),
     "directions that the arm has not": (
         lambda: OperationalSpace(Arm.load("planar2r"), 1, 1, directions=[0, 0, 1, 0, 0, 0]),
         "planar2r moves its tool in none of the directions",

@@ -49,7 +49,12 @@ def test_states_are_those_over_pinocchio(name, law):
     for _ in range(law.samples(20)):
         q, qd, tau = rng.normal(size=(3, arm.n)) * 0.3
         run = simulate(
-            arm, lambda t, q, qd, s, tau=tau: tau, q0=q, qd0=qd, duration=0.1, plant=Plant(arm, restitution=None)
+            arm,
+            lambda t, q, qd, s, tau=tau: tau,
+            q0=q,
+            qd0=qd,
+            duration=0.1,
+            plant=Plant(arm, restitution=None),
         )
         theirs, rates = pinocchio_run(arm, q, qd, tau, 1e-3, 100)
         scale = max(1.0, np.abs(rates).max())
@@ -66,18 +71,33 @@ def test_accelerations_along_a_motion_are_pinocchios(name, law):
     law.samples(1)
     rng = np.random.default_rng(4)
     wave = Sine(rng.normal(size=arm.n) * 0.2, np.full(arm.n, 0.1), 1.5)
-    run = simulate(arm, ComputedTorque.tuned(arm), wave, 0.1, plant=Plant(arm, restitution=None), saturation=False)
+    run = simulate(
+        arm,
+        ComputedTorque.tuned(arm),
+        wave,
+        0.1,
+        plant=Plant(arm, restitution=None),
+        saturation=False,
+    )
     M = mass_matrix(arm, run.q)
     if arm.couplings:  # which Pinocchio does not know
-        bias = np.stack([pin.nonLinearEffects(model, data, *row) for row in zip(run.q, run.qd, strict=True)])
+        bias = np.stack(
+            [pin.nonLinearEffects(model, data, *row) for row in zip(run.q, run.qd, strict=True)]
+        )
         crba = np.stack([np.triu(pin.crba(model, data, q)) for q in run.q])
         theirs_M = crba + np.swapaxes(np.triu(crba, 1), 1, 2) + arm.numbers.coupling
         theirs = np.linalg.solve(theirs_M, (run.tau - bias)[..., None])[..., 0]
     else:
-        theirs = np.stack([pin.aba(model, data, *row) for row in zip(run.q, run.qd, run.tau, strict=True)])
+        theirs = np.stack(
+            [pin.aba(model, data, *row) for row in zip(run.q, run.qd, run.tau, strict=True)]
+        )
     scale = np.abs(run.tau).max(axis=1) / np.diagonal(M, axis1=1, axis2=2).min(axis=1)
     allowed = np.maximum(1e-12, 4 * np.finfo(float).eps * np.linalg.cond(M))
-    law.holds("accelerations over what is allowed", (np.abs(run.qdd - theirs).max(axis=1) / scale / allowed).max(), 1.0)
+    law.holds(
+        "accelerations over what is allowed",
+        (np.abs(run.qdd - theirs).max(axis=1) / scale / allowed).max(),
+        1.0,
+    )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -96,7 +116,11 @@ def test_runge_and_kutta_are_of_order_four(name, law):
         error = np.linalg.norm(slow - exact)
         if error > 1e-11:
             seen += 1
-            law.holds("error at 2 ms over that at 1 ms, from 16", abs(error / np.linalg.norm(fast - exact) - 16), 2.0)
+            law.holds(
+                "error at 2 ms over that at 1 ms, from 16",
+                abs(error / np.linalg.norm(fast - exact) - 16),
+                2.0,
+            )
     assert seen or name in ("cobra600", "kuka_kr30_3", "manutec_r3", "puma560_akb"), (
         "no error was large enough to be measured"
     )
@@ -111,7 +135,11 @@ def test_a_passive_swing_keeps_its_energy(name, law):
     run = simulate(arm, q0=q, duration=5.0, rate=None, plant=Plant(arm, restitution=None))
     kinetic = kinetic_energy(arm, run.q, run.qd)
     energy = kinetic + potential_energy(arm, run.q)
-    law.holds("drift over the largest kinetic energy", np.abs(energy - energy[0]).max() / kinetic.max(), 1e-10)
+    law.holds(
+        "drift over the largest kinetic energy",
+        np.abs(energy - energy[0]).max() / kinetic.max(),
+        1e-10,
+    )
     law.holds("energy without account", run.audit.error, AUDIT)
 
 
@@ -120,7 +148,11 @@ def test_a_passive_swing_of_a_puma_keeps_its_energy_in_steps_of_a_millisecond(la
     run = simulate(PUMA, q0=START, duration=5.0, plant=Plant(PUMA, restitution=None))
     kinetic = kinetic_energy(PUMA, run.q, run.qd)
     energy = kinetic + potential_energy(PUMA, run.q)
-    law.holds("drift over the largest kinetic energy", np.abs(energy - energy[0]).max() / kinetic.max(), 1e-10)
+    law.holds(
+        "drift over the largest kinetic energy",
+        np.abs(energy - energy[0]).max() / kinetic.max(),
+        1e-10,
+    )
 
 
 def test_smooth_friction_takes_its_work(law):
@@ -140,7 +172,9 @@ def test_narrow_friction_takes_shorter_steps_and_ends_no_run_in_a_limit_cycle(la
     law.holds("energy without account", run.audit.error, AUDIT)
     # At the end every joint creeps: none goes back and forth.
     assert np.abs(np.diff(np.sign(run.qd[-50:]), axis=0)).max() == 0
-    with pytest.raises(ValueError, match=r"friction is too stiff: its rate of .* 1/s takes .* steps in 0.001 s"):
+    with pytest.raises(
+        ValueError, match=r"friction is too stiff: its rate of .* 1/s takes .* steps in 0.001 s"
+    ):
         simulate(PUMA, q0=START, duration=0.1, plant=Plant(PUMA, Friction(1e-8), None))
     with pytest.raises(ValueError, match="friction is too stiff"):
         simulate(PUMA, q0=START, duration=10.0, rate=None, plant=Plant(PUMA, Friction(1e-8), None))
@@ -168,11 +202,20 @@ def test_a_joint_breaks_away_where_friction_cannot_hold_it():
     arm = replace(library_robot("puma560"), gravity=(ZERO,) * 3)
     plant = Plant(arm, Friction())
     for joint in range(6):
-        for direction, bound in ((1, arm.numbers.coulomb[joint, 0]), (-1, arm.numbers.coulomb[joint, 1])):
+        for direction, bound in (
+            (1, arm.numbers.coulomb[joint, 0]),
+            (-1, arm.numbers.coulomb[joint, 1]),
+        ):
             for share, moves in ((0.999, False), (1.001, True)):
                 tau = np.zeros(6)
                 tau[joint] = share * bound
-                run = simulate(arm, lambda t, q, qd, s, tau=tau: tau, q0=np.zeros(6), duration=0.01, plant=plant)
+                run = simulate(
+                    arm,
+                    lambda t, q, qd, s, tau=tau: tau,
+                    q0=np.zeros(6),
+                    duration=0.01,
+                    plant=plant,
+                )
                 assert (direction * run.qd[-1, joint] > 0) == moves, (joint, direction, share)
 
 
@@ -200,12 +243,16 @@ def test_a_stop_leaves_the_share_of_the_rate_that_it_should(restitution, law):
     law.holds("penetration, rad", beyond, 1e-9)
     impact = int(np.argmax(run.qd[:, 2] <= 0))
     before, after = run.qd[impact - 1, 2], run.qd[impact, 2]
-    law.holds("share of the rate", abs(after / before + restitution), 2e-3)  # a step of gravity lies between
+    law.holds(
+        "share of the rate", abs(after / before + restitution), 2e-3
+    )  # a step of gravity lies between
     law.holds("energy without account", run.audit.error, AUDIT)
     if restitution == 0:
         assert run.audit.impacts > 0
     if restitution == 1:
-        law.holds("energy lost by a perfect rebound over the kinetic energy", run.audit.impacts, 1e-12)
+        law.holds(
+            "energy lost by a perfect rebound over the kinetic energy", run.audit.impacts, 1e-12
+        )
 
 
 @pytest.mark.parametrize("rate", [1000.0, None])
@@ -213,11 +260,15 @@ def test_a_stop_leaves_the_share_of_the_rate_that_it_should(restitution, law):
 def test_at_rest_against_a_stop_an_arm_stays(rate):
     """Gravity lets the arm fall on its stops, where it stays, whatever it is pushed with against them."""
     push = Push([0.0, 0.0, -30.0], begin=1.2)
-    run = simulate(PUMA, q0=START, duration=1.5, rate=rate, plant=Plant(PUMA, Friction(), 0.0, (push,)))
+    run = simulate(
+        PUMA, q0=START, duration=1.5, rate=rate, plant=Plant(PUMA, Friction(), 0.0, (push,))
+    )
     at_stop = (run.q[-1] == PUMA.numbers.lower) | (run.q[-1] == PUMA.numbers.upper)
     assert at_stop.any()
     late = run.t > 1.0
-    assert np.all(run.qd[late][:, at_stop] == 0) and np.all(run.q[late][:, at_stop] == run.q[-1][at_stop])
+    assert np.all(run.qd[late][:, at_stop] == 0) and np.all(
+        run.q[late][:, at_stop] == run.q[-1][at_stop]
+    )
 
 
 @pytest.mark.slow
@@ -237,7 +288,15 @@ def test_a_joint_that_leaves_its_stop_and_is_back_within_the_step_comes_to_rest(
     arm = library_robot("ax12_arm")
     q, qd, tau = np.zeros((3, arm.n))
     q[-1], qd[-1], tau[-1] = arm.numbers.lower[-1], 1.2e-4, -arm.numbers.effort[-1]
-    run = simulate(arm, lambda *_: tau, q0=q, qd0=qd, rate=1e6, duration=5e-6, plant=Plant(arm, restitution=0.0))
+    run = simulate(
+        arm,
+        lambda *_: tau,
+        q0=q,
+        qd0=qd,
+        rate=1e6,
+        duration=5e-6,
+        plant=Plant(arm, restitution=0.0),
+    )
     assert np.all(run.qd[1:, -1] == 0) and np.all(run.q[:, -1] == q[-1])
 
 
@@ -259,10 +318,15 @@ def test_any_run_accounts_for_its_energy(law):
         friction = (None, Friction(), Friction(0.1), Friction(0.01))[rng.integers(4)]
         restitution = (None, 0.0, 0.4, 1.0)[rng.integers(4)]
         push = Push(
-            rng.normal(size=3) * 10, rng.normal(size=3), begin=0.05 * rng.random(), end=0.1 + 0.1 * rng.random()
+            rng.normal(size=3) * 10,
+            rng.normal(size=3),
+            begin=0.05 * rng.random(),
+            end=0.1 + 0.1 * rng.random(),
         )
         pushes = (push,) if rng.random() < 0.4 else ()
-        controller = (None, ComputedTorque.tuned(arm), PID.tuned(arm), PDGravity.tuned(arm))[rng.integers(4)]
+        controller = (None, ComputedTorque.tuned(arm), PID.tuned(arm), PDGravity.tuned(arm))[
+            rng.integers(4)
+        ]
         run = simulate(
             arm,
             controller,
@@ -271,12 +335,21 @@ def test_any_run_accounts_for_its_energy(law):
             q0=rng.uniform(lower, upper),
             qd0=rng.normal(size=arm.n) * rng.choice([0.0, 0.1, 2.0]),
             rate=None if rng.random() < 0.2 else 1000.0,
-            plant_rate=10_000.0 if friction != Friction(0.01) else 160_000.0 if arm.name in FASTEST else 80_000.0,
+            plant_rate=10_000.0
+            if friction != Friction(0.01)
+            else 160_000.0
+            if arm.name in FASTEST
+            else 80_000.0,
             plant=Plant(arm, friction, restitution, pushes),
         )
         sudden = friction is not None and friction.width == 0
         where = f"trial {trial}: {arm.name}, {friction}, restitution {restitution}"
-        law.holds(f"energy without account, stiction {sudden}", run.audit.error, SUDDEN if sudden else AUDIT, where)
+        law.holds(
+            f"energy without account, stiction {sudden}",
+            run.audit.error,
+            SUDDEN if sudden else AUDIT,
+            where,
+        )
         if restitution is not None:
             beyond = np.maximum(run.q - arm.numbers.upper, arm.numbers.lower - run.q).max()
             law.holds("penetration, rad or m", beyond, 1e-9, where)
@@ -290,7 +363,9 @@ def test_pushes_do_work(law):
     run = simulate(PUMA, ComputedTorque.tuned(PUMA), reference=START, duration=0.5, plant=plant)
     assert run.audit.pushes > 0
     law.holds("energy without account", run.audit.error, AUDIT)
-    qdd = forward_dynamics(PUMA, run.q[200], run.qd[200], run.tau[200], wrench=[30, -10, 5, 1, 2, -3])
+    qdd = forward_dynamics(
+        PUMA, run.q[200], run.qd[200], run.tau[200], wrench=[30, -10, 5, 1, 2, -3]
+    )
     assert np.abs(run.qdd[200] - qdd).max() < 1e-9 * np.abs(qdd).max()
 
 
@@ -298,9 +373,21 @@ def test_pushes_do_work(law):
 def test_the_audit_closes_under_control(law):
     law.samples(1)
     control = ComputedTorque.tuned(PUMA)
-    for friction, rate, required in ((None, 1000, AUDIT), (Friction(), 1000, SUDDEN), (Friction(0.05), 4000, AUDIT)):
+    for friction, rate, required in (
+        (None, 1000, AUDIT),
+        (Friction(), 1000, SUDDEN),
+        (Friction(0.05), 4000, AUDIT),
+    ):
         plant = Plant(PUMA, friction)
-        run = simulate(PUMA, control, reference=START, q0=np.zeros(6), duration=1.0, plant=plant, plant_rate=rate)
+        run = simulate(
+            PUMA,
+            control,
+            reference=START,
+            q0=np.zeros(6),
+            duration=1.0,
+            plant=plant,
+            plant_rate=rate,
+        )
         law.holds("energy without account", run.audit.error, required)
 
 
@@ -320,6 +407,8 @@ def test_continuous_and_sampled_runs_meet(law):
         law.holds(f"{name}: joint values", np.abs(continuous.q - sampled.q).max(), 1e-8)
         law.holds(f"{name}: energy without account, continuous", continuous.audit.error, AUDIT)
         law.holds(f"{name}: energy without account, sampled", sampled.audit.error, SUDDEN)
-        beyond = np.maximum(continuous.q - PUMA.numbers.upper, PUMA.numbers.lower - continuous.q).max()
+        beyond = np.maximum(
+            continuous.q - PUMA.numbers.upper, PUMA.numbers.lower - continuous.q
+        ).max()
         if plant.restitution is not None:
             law.holds(f"{name}: penetration, rad", beyond, 1e-9)

@@ -18,7 +18,9 @@ def test_norms_are_those_of_the_errors(name):
     result = swinging(library_robot(name))
     errors = result.reference_q - result.q
     assert np.array_equal(result.peak_error, np.abs(errors).max(axis=0))
-    assert np.allclose(result.rms_error, np.linalg.norm(errors, axis=0) / np.sqrt(len(errors)), rtol=ROUNDING)
+    assert np.allclose(
+        result.rms_error, np.linalg.norm(errors, axis=0) / np.sqrt(len(errors)), rtol=ROUNDING
+    )
     assert np.array_equal(result.final_error, errors[-1])
     for norms, error in (
         (result.tool_norms, result.tool_error),
@@ -33,7 +35,9 @@ def test_norms_are_those_of_the_errors(name):
 @pytest.mark.parametrize("name", ["puma560", "panda"])
 def test_the_tools_angle_is_scipys(name):
     result = swinging(library_robot(name), error=0.5)
-    between = Rotation.from_matrix(result.T[:, :3, :3]).inv() * Rotation.from_matrix(result.reference_T[:, :3, :3])
+    between = Rotation.from_matrix(result.T[:, :3, :3]).inv() * Rotation.from_matrix(
+        result.reference_T[:, :3, :3]
+    )
     assert np.abs(result.tool_rotation_error - between.magnitude()).max() < 1e-8
     assert result.tool_rotation_error.max() > 0.1
 

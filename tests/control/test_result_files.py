@@ -43,7 +43,9 @@ def test_files_hold_every_bit(name, suffix, tmp_path):
     assert again.description is library_robot(name)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
     for ours, theirs in zip(again.tool_norms, result.tool_norms, strict=True):
-        assert ours == pytest.approx(theirs, abs=1e-14)  # interpreted and compiled kernels round differently
+        assert ours == pytest.approx(
+            theirs, abs=1e-14
+        )  # interpreted and compiled kernels round differently
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -67,7 +69,9 @@ def test_an_archive_holds_a_robot_that_nobody_knows_and_a_table_asks_for_it(tmp_
     for suffix in (".npz", ".mat"):
         assert SimulationResult.load(result.save(tmp_path / f"run{suffix}")).description == arm
     path = result.save(tmp_path / "run.csv")
-    with pytest.raises(DescriptionError, match=r"its robot planar2r \(.*\) is not the library's; give the robot"):
+    with pytest.raises(
+        DescriptionError, match=r"its robot planar2r \(.*\) is not the library's; give the robot"
+    ):
         SimulationResult.load(path)
     assert SimulationResult.load(path, arm).description is arm
 
@@ -125,31 +129,61 @@ def spoiled(value, row=3):
 
 
 BAD_VALUES = {
-    "no torques": ({"tau": None}, r"no tau in it: found .*; expected a simulation that dhkit saved"),
-    "a later version": ({"format": "dhkit simulation 9"}, "format is 'dhkit simulation 9'; expected 'dhkit simulation"),
+    "no torques": (
+        {"tau": None},
+        r"no tau in it: found .*; expected a simulation that dhkit saved",
+    ),
+    "a later version": (
+        {"format": "dhkit simulation 9"},
+        "format is 'dhkit simulation 9'; expected 'dhkit simulation",
+    ),
     "a trajectory's label": ({"format": "dhkit trajectory 1"}, "format is 'dhkit trajectory 1'"),
-    "another digest": ({"digest": "0" * 12}, "its robot is not the 'planar2r' that it names; the file is damaged"),
+    "another digest": (
+        {"digest": "0" * 12},
+        "its robot is not the 'planar2r' that it names; the file is damaged",
+    ),
     "another name": ({"robot": "puma560"}, "its robot is not the 'puma560' that it names"),
     "a robot cut short": ({"toml": "format = 1\nname = "}, "its robot"),
     "too few rows": ({"qd": np.ones((4, 2))}, r"qd has shape \(4, 2\); expected \(5, 2\)"),
-    "another arm's columns": ({"reference_q": np.ones((5, 6))}, r"reference_q has shape \(5, 6\); expected \(5, 2\)"),
-    "rows and columns exchanged": ({"q": np.ones((2, 5))}, r"q has shape \(2, 5\); expected \(5, 2\)"),
+    "another arm's columns": (
+        {"reference_q": np.ones((5, 6))},
+        r"reference_q has shape \(5, 6\); expected \(5, 2\)",
+    ),
+    "rows and columns exchanged": (
+        {"q": np.ones((2, 5))},
+        r"q has shape \(2, 5\); expected \(5, 2\)",
+    ),
     "times as a matrix": ({"t": np.ones((5, 2))}, r"t has shape \(5, 2\); expected \(10,\)"),
     "no state": ({"t": np.zeros((1, 0))}, "t has no values"),
-    "NaN": ({"tau_asked": spoiled(np.nan)}, "tau_asked has values that are not finite, the first in row 3"),
-    "infinite": ({"qdd": spoiled(-np.inf, 0)}, "qdd has values that are not finite, the first in row 0"),
-    "times that do not increase": ({"t": np.array([0, 1, 2, 2, 3.0])}, r"t\[2\] is 2 s, t\[3\] is 2 s"),
+    "NaN": (
+        {"tau_asked": spoiled(np.nan)},
+        "tau_asked has values that are not finite, the first in row 3",
+    ),
+    "infinite": (
+        {"qdd": spoiled(-np.inf, 0)},
+        "qdd has values that are not finite, the first in row 0",
+    ),
+    "times that do not increase": (
+        {"t": np.array([0, 1, 2, 2, 3.0])},
+        r"t\[2\] is 2 s, t\[3\] is 2 s",
+    ),
     "times that begin late": ({"t": np.arange(1.0, 6.0)}, "t begins with 1 s; expected 0"),
     "an audit that is not a number": (
         {"audit_drives": np.float64(np.nan)},
         "audit_drives has values that are not finite",
     ),
-    "an audit of two numbers": ({"audit_drives": np.ones(2)}, r"audit_drives has shape .*; expected \(\)"),
+    "an audit of two numbers": (
+        {"audit_drives": np.ones(2)},
+        r"audit_drives has shape .*; expected \(\)",
+    ),
     "a share beyond 1": (
         {"saturated": np.array([0.5, 1.5])},
         r"saturated is \[0.5, 1.5\]; expected shares",
     ),
-    "shares of another arm": ({"saturated": np.ones(3)}, r"saturated has shape .*; expected \(2,\)"),
+    "shares of another arm": (
+        {"saturated": np.ones(3)},
+        r"saturated has shape .*; expected \(2,\)",
+    ),
     "text for numbers": ({"tau": "none"}, "tau: found (text|type <U4); expected (numbers|float64)"),
 }
 
@@ -164,19 +198,47 @@ def test_an_archive_of_wrong_values_is_refused(suffix, name, tmp_path):
 
 
 BAD_LINES = {
-    "another title": (r"# dhkit simulation", "# dhkit trajectory", "does not begin with '# dhkit simulation'"),
+    "another title": (
+        r"# dhkit simulation",
+        "# dhkit trajectory",
+        "does not begin with '# dhkit simulation'",
+    ),
     "no robot": (r"# robot: .*\n", "", "does not begin with .* and '# robot: NAME DIGEST'"),
-    "no audit": (r"# audit_drives.*\n", "", "no comment '# audit_drives: ...'; expected a simulation that dhkit saved"),
-    "an audit of words": (r"(# audit_drives:).*", r"\1 much", "audit_drives is 'much'; expected numbers"),
-    "an audit of nothing": (r"(# audit_drives:).*", r"\1", r"audit_drives has shape \(0,\); expected \(\)"),
-    "an infinite audit": (r"(# audit_drives:).*", r"\1 inf", "audit_drives has values that are not finite"),
+    "no audit": (
+        r"# audit_drives.*\n",
+        "",
+        "no comment '# audit_drives: ...'; expected a simulation that dhkit saved",
+    ),
+    "an audit of words": (
+        r"(# audit_drives:).*",
+        r"\1 much",
+        "audit_drives is 'much'; expected numbers",
+    ),
+    "an audit of nothing": (
+        r"(# audit_drives:).*",
+        r"\1",
+        r"audit_drives has shape \(0,\); expected \(\)",
+    ),
+    "an infinite audit": (
+        r"(# audit_drives:).*",
+        r"\1 inf",
+        "audit_drives has values that are not finite",
+    ),
     "one share": (r"(# saturated:).*", r"\1 0.5", r"saturated has shape \(1,\); expected \(2,\)"),
-    "other columns": ("tau_asked1", "tau_wanted1", "columns t, q1, .*; expected t, q1, q2, .*tau_asked1"),
+    "other columns": (
+        "tau_asked1",
+        "tau_wanted1",
+        "columns t, q1, .*; expected t, q1, q2, .*tau_asked1",
+    ),
     "a column too few": (",reference_qd2", "", "line 12: 15 values; expected 14, as in the header"),
     "a word": (r"\n0,[^,]*,", "\n0,fast,", "line 12: q1 is 'fast'; expected a number"),
     "NaN": (r"\n0,[^,]*,", "\n0,nan,", "line 12: q1 is nan; expected a finite number"),
     "times that begin late": (r"\n0,", "\n0.1,", "t begins with 0.1 s; expected 0"),
-    "another number": (r"\n0,[^,]*,", "\n0,0.25,", "changed since dhkit wrote it: its digest differs"),
+    "another number": (
+        r"\n0,[^,]*,",
+        "\n0,0.25,",
+        "changed since dhkit wrote it: its digest differs",
+    ),
     "no digest": (r"# content: .*\n", "", "no comment '# content: DIGEST' in its third line"),
     "no states": (r"\n[-\d][^#]*\Z", "\n", "no samples in it"),
 }
@@ -196,7 +258,11 @@ def test_a_table_of_wrong_lines_is_refused(name, tmp_path):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_another_robots_file_is_refused(suffix, tmp_path):
     path = swinging(library_robot("puma560")).save(tmp_path / f"run{suffix}")
-    refused(path, rf"made for the robot puma560 \(.*\); expected one for planar2r \(digest {ARM.digest}\)", ARM)
+    refused(
+        path,
+        rf"made for the robot puma560 \(.*\); expected one for planar2r \(digest {ARM.digest}\)",
+        ARM,
+    )
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -227,7 +293,9 @@ def test_pickled_members_are_never_read(tmp_path):
     refused(path, "q: found type object; expected float64")
 
 
-@pytest.mark.parametrize(("suffix", "complaint"), [(".npz", "unpacks to 0 MB"), (".mat", "unpacks to more than the")])
+@pytest.mark.parametrize(
+    ("suffix", "complaint"), [(".npz", "unpacks to 0 MB"), (".mat", "unpacks to more than the")]
+)
 def test_an_archive_is_not_unpacked_beyond_its_bound(suffix, complaint, tmp_path):
     from scipy.io import savemat
 
@@ -243,7 +311,9 @@ def test_an_archive_is_not_unpacked_beyond_its_bound(suffix, complaint, tmp_path
 
 def test_headers_that_promise_too_much_are_refused(tmp_path):
     member = io.BytesIO()
-    np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": (10**9, 10**9, 2)})
+    np.lib.format.write_array_header_1_0(
+        member, {"descr": "<f8", "fortran_order": False, "shape": (10**9, 10**9, 2)}
+    )
     path = tmp_path / "bad.npz"
     good = io.BytesIO(archive_bytes(".npz", values()))
     with zipfile.ZipFile(path, "w") as archive, zipfile.ZipFile(good) as source:
@@ -256,7 +326,9 @@ def test_headers_that_promise_too_much_are_refused(tmp_path):
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_what_could_not_be_read_is_not_written(suffix, name, value, tmp_path):
     result = replace(swinging(ARM, 5), **{name: spoiled(value)})
-    with pytest.raises(ValueError, match=f"{name} has values that are not finite, the first in row 3"):
+    with pytest.raises(
+        ValueError, match=f"{name} has values that are not finite, the first in row 3"
+    ):
         result.save(tmp_path / f"run{suffix}")
     assert list(tmp_path.iterdir()) == []
 

@@ -57,8 +57,14 @@ def test_poses_are_reached_on_straight_lines(law):
     across = way - np.outer(way @ [1, 1, 0], [0.5, 0.5, 0])
     law.holds("m, off the line", np.abs(across).max(), ON_THE_LINE)
     # Joint values, rates and accelerations belong together.
-    law.holds("rad/s, rates against differences", np.abs(np.gradient(q, t, axis=0) - qd)[1:-1].max(), 2e-5)
-    law.holds("rad/s^2, accelerations against differences", np.abs(np.gradient(qd, t, axis=0) - qdd)[1:-1].max(), 2e-2)
+    law.holds(
+        "rad/s, rates against differences", np.abs(np.gradient(q, t, axis=0) - qd)[1:-1].max(), 2e-5
+    )
+    law.holds(
+        "rad/s^2, accelerations against differences",
+        np.abs(np.gradient(qd, t, axis=0) - qdd)[1:-1].max(),
+        2e-2,
+    )
     assert np.all(q[t < 0.5] == q[0]) and np.all(qd[t < 0.5] == 0)
     assert np.all(q[t >= 3.0] == q[-1]) and np.all(qdd[t >= 3.0] == 0)
     assert set(times) <= set(reference.jumps)
@@ -67,7 +73,9 @@ def test_poses_are_reached_on_straight_lines(law):
 def test_a_planar_and_a_redundant_arm_follow_poses():
     planar = Arm.load("planar2r")
     reference = ToolPoses(planar, [[0.6, 0.3, 0.0], [0.3, 0.6, 0.0]], [0.0, 1.0], q0=[0.1, 0.9])
-    assert np.allclose(planar.fk(reference.sampled(np.array([1.0]))[0][0])[:2, 3], [0.3, 0.6], atol=ON_THE_LINE)
+    assert np.allclose(
+        planar.fk(reference.sampled(np.array([1.0]))[0][0])[:2, 3], [0.3, 0.6], atol=ON_THE_LINE
+    )
     q = PANDA.configurations["ready"]
     goal = PANDA.fk(q)
     goal[:3, 3] += [0.0, 0.1, 0.05]
@@ -76,22 +84,64 @@ def test_a_planar_and_a_redundant_arm_follow_poses():
 
 
 BAD = {
-    "a pose out of reach": (lambda: reference_of(PUMA.description, FAR, NOMINAL), "reference: puma560 cannot hold it"),
-    "one that an iteration does not reach": (lambda: reference_of(PANDA.description, FAR), "panda cannot hold it"),
+    "a pose out of reach": (
+        lambda: reference_of(PUMA.description, FAR, NOMINAL),
+        "reference: puma560 cannot hold it",
+    ),
+    "one that an iteration does not reach": (
+        lambda: reference_of(PANDA.description, FAR),
+        "panda cannot hold it",
+    ),
     "no pose": (lambda: reference_of(PUMA.description, np.ones((4, 4))), "reference is not a pose"),
-    "a pose of NaN": (lambda: reference_of(PUMA.description, T * np.nan), "reference has values that are not finite"),
-    "another matrix": (lambda: reference_of(PUMA.description, np.eye(3)), r"reference has shape \(3, 3\); expected"),
-    "q0 of another arm": (lambda: reference_of(PUMA.description, T, np.zeros(7)), r"q0 has shape \(7,\)"),
-    "a first pose out of reach": (lambda: ToolPoses(PUMA, [FAR, T], [0, 1]), "pose 0: puma560 cannot hold it"),
-    "a line out of reach": (lambda: ToolPoses(PUMA, [T, FAR], [0, 1]), "from pose 0 to pose 1: the path leaves"),
-    "positions without orientation": (lambda: ToolPoses(PUMA, [[0.5, 0, 0]], [0]), "q0 is not given"),
-    "times that stand still": (lambda: ToolPoses(PUMA, [T, T], [1, 1]), r"times is \[1.0, 1.0\]; expected seconds"),
-    "times before 0": (lambda: ToolPoses(PUMA, [T, T], [-1, 0]), "expected seconds that ascend, from 0 on"),
-    "times that are fewer": (lambda: ToolPoses(PUMA, [T, T], [0]), r"times has shape \(1,\); expected \(2,\)"),
-    "poses of five numbers": (lambda: ToolPoses(PUMA, np.ones((2, 5)), [0, 1]), r"poses has shape \(2, 5\)"),
+    "a pose of NaN": (
+        lambda: reference_of(PUMA.description, T * np.nan),
+        "reference has values that are not finite",
+    ),
+    "another matrix": (
+        lambda: reference_of(PUMA.description, np.eye(3)),
+        r"reference has shape \(3, 3\); expected",
+    ),
+    "q0 of another arm": (
+        lambda: reference_of(PUMA.description, T, np.zeros(7)),
+        r"q0 has shape \(7,\)",
+    ),
+    "a first pose out of reach": (
+        lambda: ToolPoses(PUMA, [FAR, T], [0, 1]),
+        "pose 0: puma560 cannot hold it",
+    ),
+    "a line out of reach": (
+        lambda: ToolPoses(PUMA, [T, FAR], [0, 1]),
+        "from pose 0 to pose 1: the path leaves",
+    ),
+    "positions without orientation": (
+        lambda: ToolPoses(PUMA, [[0.5, 0, 0]], [0]),
+        "q0 is not given",
+    ),
+    "times that stand still": (
+        lambda: ToolPoses(PUMA, [T, T], [1, 1]),
+        r"times is \[1.0, 1.0\]; expected seconds",
+    ),
+    "times before 0": (
+        lambda: ToolPoses(PUMA, [T, T], [-1, 0]),
+        "expected seconds that ascend, from 0 on",
+    ),
+    "times that are fewer": (
+        lambda: ToolPoses(PUMA, [T, T], [0]),
+        r"times has shape \(1,\); expected \(2,\)",
+    ),
+    "poses of five numbers": (
+        lambda: ToolPoses(PUMA, np.ones((2, 5)), [0, 1]),
+        r"poses has shape \(2, 5\)",
+    ),
     "no pose at all": (lambda: ToolPoses(PUMA, np.zeros((0, 3)), []), r"poses has shape \(0, 3\)"),
-    "poses of NaN": (lambda: ToolPoses(PUMA, [T * np.nan], [0]), "poses has values that are not finite"),
-    "poses that are words": (lambda: ToolPoses(PUMA, "here", [0]), "poses: found 'here'; expected numbers"),
+    "poses of NaN": (
+        lambda: ToolPoses(PUMA, [T * np.nan], [0]),
+        "poses has values that are not finite",
+    ),
+    "poses that are words": (
+        lambda: ToolPoses(PUMA, "here", [0]),
+        "poses: found 'here'; expected numbers",
+    ),
     "no arm": (lambda: ToolPoses("puma560", [T], [0]), "found str; expected an arm"),
 }
 
@@ -99,6 +149,8 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_it_is_refused_in_one_line(name):
     call, message = BAD[name]
-    with pytest.raises((ValueError, TypeError, UnreachableError, PlanningError), match=message) as caught:
+    with pytest.raises(
+        (ValueError, TypeError, UnreachableError, PlanningError), match=message
+    ) as caught:
         call()
     assert "\n" not in str(caught.value)

@@ -57,7 +57,11 @@ def test_a_reference_cannot_change_the_time_of_the_run():
 
         def sampled(self, t):
             t -= 0.1
-            return START + 0.2 * np.clip(t, 0, None)[:, None], np.zeros((len(t), 6)), np.zeros((len(t), 6))
+            return (
+                START + 0.2 * np.clip(t, 0, None)[:, None],
+                np.zeros((len(t), 6)),
+                np.zeros((len(t), 6)),
+            )
 
     for rate in (1000.0, None):
         run = ARM.simulate(HOLD, Late(), duration=0.3, rate=rate)
@@ -68,13 +72,19 @@ def test_the_tool_is_measured_against_the_arm_that_the_reference_is_of(tmp_path)
     longer = SMALL.with_parameters(l1=0.52)
     T = SMALL.fk([0.3, 0.5])
     run = SMALL.simulate(ComputedTorque.tuned(longer), T, duration=0.1, plant=longer, q0=[0.3, 0.5])
-    assert run.tool_norms.final == pytest.approx(np.linalg.norm(T[:3, 3] - run.T[-1][:3, 3]), rel=1e-12)
+    assert run.tool_norms.final == pytest.approx(
+        np.linalg.norm(T[:3, 3] - run.T[-1][:3, 3]), rel=1e-12
+    )
     assert run.tool_norms.final > 0.019
     again = SimulationResult.load(run.save(tmp_path / "run.npz"))
     assert again.tool_norms == run.tool_norms
     with pytest.raises(ValueError, match="no room for the reference's poses"):
         run.save(tmp_path / "run.csv")
-    assert not len(SMALL.simulate(None, q0=[0.3, 0.5], duration=0.01, plant=SMALL.with_payload(0.1)).reference_poses)
+    assert not len(
+        SMALL.simulate(
+            None, q0=[0.3, 0.5], duration=0.01, plant=SMALL.with_payload(0.1)
+        ).reference_poses
+    )
 
 
 def test_a_kernel_that_is_compiled_meanwhile_makes_no_other_arm(monkeypatch):
@@ -94,7 +104,10 @@ def test_a_continuous_run_does_not_step_over_a_pulse(length):
     def pulse(t, q, qd, setpoint):
         return HOLD(t, q, qd, setpoint) + np.array([50.0 * (0.9 < t < 0.9 + length), 0, 0, 0, 0, 0])
 
-    moved = [np.abs(ARM.simulate(pulse, START, 1.2, rate=rate).q - START).max() for rate in (None, 4000.0)]
+    moved = [
+        np.abs(ARM.simulate(pulse, START, 1.2, rate=rate).q - START).max()
+        for rate in (None, 4000.0)
+    ]
     assert moved[0] == pytest.approx(moved[1], rel=0.05) and moved[0] > 1e-4
 
 
@@ -113,7 +126,9 @@ def test_a_joint_does_not_break_away_between_two_rows_unseen():
 
 
 def test_an_audit_of_what_failed_is_not_fine():
-    batch = SMALL.simulate_batch(None, q0=[[0, 0], [1, 1]], qd0=[[1e200, 1e200], [0, 0]], duration=0.05)
+    batch = SMALL.simulate_batch(
+        None, q0=[[0, 0], [1, 1]], qd0=[[1e200, 1e200], [0, 0]], duration=0.05
+    )
     assert batch.failed.tolist() == [True, False] and batch.outside[0]
     assert not batch.audit(0).error <= 1e-9
     assert "1 failed" in repr(batch)
@@ -125,7 +140,9 @@ def test_an_audit_of_what_failed_is_not_fine():
 def test_a_pose_is_not_four_arms():
     arm = Arm.load("cobra600")
     T = arm.fk([0.3, 0.4, 0.1, 0.2])
-    with pytest.raises(ValueError, match="looks like a pose of the tool; a batch holds joint values"):
+    with pytest.raises(
+        ValueError, match="looks like a pose of the tool; a batch holds joint values"
+    ):
         arm.simulate_batch(PDGravity.tuned(arm), T, duration=0.05, q0=np.zeros(4))
 
 
@@ -161,7 +178,9 @@ def test_a_joint_that_passes_its_stop_and_comes_back_within_a_step_is_stopped():
     for depth in (1e-6, 1e-5):
         q[0] = upper[0] - 3e-5
         qd[0] = np.sqrt(2 * abs(pull) / M * (3e-5 + depth))
-        run = arm.simulate(lambda t, q, qd, s: [pull, 0.0], q0=q, qd0=qd, duration=0.01, rate=100, saturation=False)
+        run = arm.simulate(
+            lambda t, q, qd, s: [pull, 0.0], q0=q, qd0=qd, duration=0.01, rate=100, saturation=False
+        )
         assert run.audit.impacts > 0, depth
 
 
@@ -195,7 +214,11 @@ def test_the_name_of_a_column_counts_before_its_capitals(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "controller", [ComputedTorque, *(pytest.param(law, marks=only_accepting) for law in (PDGravity, OperationalSpace))]
+    "controller",
+    [
+        ComputedTorque,
+        *(pytest.param(law, marks=only_accepting) for law in (PDGravity, OperationalSpace)),
+    ],
 )
 @pytest.mark.slow
 def test_continuous_runs_go_on_after_a_rest(controller):
@@ -206,12 +229,21 @@ def test_continuous_runs_go_on_after_a_rest(controller):
 
 def test_a_run_that_is_lost_says_so_and_keeps_what_there_was():
     with pytest.raises(SimulationError, match="no longer finite after") as caught:
-        ARM.simulate(ComputedTorque.tuned(ARM, bandwidth=100), START + 0.1, 10.0, START, rate=3, restitution=None)
+        ARM.simulate(
+            ComputedTorque.tuned(ARM, bandwidth=100),
+            START + 0.1,
+            10.0,
+            START,
+            rate=3,
+            restitution=None,
+        )
     assert len(caught.value.result.t) >= 1
 
 
 def test_an_arm_without_inertia_is_refused_by_everything_that_needs_one():
-    arm = Arm.from_dh([(0, 0, 0.3, "pi/2"), (0, 0.126, 0, 0)], name="flange").with_uniform_links([1, 1])
+    arm = Arm.from_dh([(0, 0, 0.3, "pi/2"), (0, 0.126, 0, 0)], name="flange").with_uniform_links(
+        [1, 1]
+    )
     calls = [
         lambda: arm.simulate(q0=[0.1, 0.2], duration=0.1),
         lambda: arm.simulate(q0=[0.1, 0.2], duration=0.1, rate=None),
@@ -270,24 +302,49 @@ def run(**options):
 
 def many(**options):
     return SMALL.simulate_batch(
-        **{"controller": ComputedTorque.tuned(SMALL), "q0": np.zeros((3, 2)), "duration": 0.01} | options
+        **{"controller": ComputedTorque.tuned(SMALL), "q0": np.zeros((3, 2)), "duration": 0.01}
+        | options
     )
 
 
 BAD = {
-    "too many steps of the plant": (lambda: run(plant_rate=1e12), "makes 1.1e.10 steps; expected at most"),
+    "too many steps of the plant": (
+        lambda: run(plant_rate=1e12),
+        "makes 1.1e.10 steps; expected at most",
+    ),
     "rates that are NaN": (
         lambda: run(controller=Pairless(rates=[np.nan]), rate=None),
         "derivatives that are not finite",
     ),
-    "no pair": (lambda: run(controller=Pairless(rates=None), rate=None), "returned NoneType at 0 s"),
-    "a state that is a word": (lambda: run(controller=Pairless(state="abc"), rate=None), "initial_state"),
-    "a state that is NaN": (lambda: run(controller=Pairless(state=np.nan), rate=None), "initial_state"),
-    "a reset that fails": (lambda: run(controller=Resetting()), r"reset\(\) of the controller raised OSError: no way"),
+    "no pair": (
+        lambda: run(controller=Pairless(rates=None), rate=None),
+        "returned NoneType at 0 s",
+    ),
+    "a state that is a word": (
+        lambda: run(controller=Pairless(state="abc"), rate=None),
+        "initial_state",
+    ),
+    "a state that is NaN": (
+        lambda: run(controller=Pairless(state=np.nan), rate=None),
+        "initial_state",
+    ),
+    "a reset that fails": (
+        lambda: run(controller=Resetting()),
+        r"reset\(\) of the controller raised OSError: no way",
+    ),
     "less than a period": (lambda: run(duration=1.0, rate=0.1), "less than half a period"),
-    "a reference of no time": (lambda: run(reference=Backwards(0), duration=None), "reference's duration is -1"),
-    "weights that are nothing": (lambda: LQR(SMALL, [0, 0], Q=np.zeros(4)), "leave the arm unstable"),
-    "complex torques": (lambda: run(controller=lambda *a: np.zeros(2, complex)), "returned complex128"),
+    "a reference of no time": (
+        lambda: run(reference=Backwards(0), duration=None),
+        "reference's duration is -1",
+    ),
+    "weights that are nothing": (
+        lambda: LQR(SMALL, [0, 0], Q=np.zeros(4)),
+        "leave the arm unstable",
+    ),
+    "complex torques": (
+        lambda: run(controller=lambda *a: np.zeros(2, complex)),
+        "returned complex128",
+    ),
     "torques in words": (lambda: run(controller=lambda *a: ["1", "2"]), "returned list"),
     "masked torques": (
         lambda: run(controller=lambda *a: np.ma.masked_array([1.0, 2.0], [0, 1])),
@@ -299,9 +356,15 @@ BAD = {
     "saturation in words": (lambda: run(saturation="no"), "saturation is 'no'"),
     "a rate that is true": (lambda: run(rate=True), "rate is True"),
     "a link that is not a number": (lambda: Push([1, 0, 0], link=1.5), "link is 1.5"),
-    "a link of another arm": (lambda: run(pushes=[Push([1, 0, 0], link=9, begin=5)]), "link is 9; planar2r has 2"),
+    "a link of another arm": (
+        lambda: run(pushes=[Push([1, 0, 0], link=9, begin=5)]),
+        "link is 9; planar2r has 2",
+    ),
     "no push": (lambda: run(pushes=[(0, 0, 1)]), "pushes has tuple; expected Push"),
-    "a controller of another arm": (lambda: run(controller=HOLD), "one of puma560, joints RRRRRR; expected RR"),
+    "a controller of another arm": (
+        lambda: run(controller=HOLD),
+        "one of puma560, joints RRRRRR; expected RR",
+    ),
     "one of another arm in a batch": (lambda: many(controller=HOLD), "one of puma560"),
     "friction compensated around one at a time": (
         lambda: many(controller=FrictionCompensation(OperationalSpace.tuned(SMALL))),
@@ -313,17 +376,32 @@ BAD = {
     ),
     "a batch with stiction": (lambda: many(friction=True), "a batch has no stiction"),
     "a batch in continuous time": (lambda: many(rate=None), "rate is None"),
-    "a plant by name": (lambda: simulate(SMALL.description, plant="planar2r", q0=[0, 0], duration=1), "plant is str"),
+    "a plant by name": (
+        lambda: simulate(SMALL.description, plant="planar2r", q0=[0, 0], duration=1),
+        "plant is str",
+    ),
     "sensors that are a number": (lambda: run(sensors=3), "sensors is int"),
     "a reference of two arrays": (lambda: run(reference=Returning((1, 2))), "returned 2 arrays"),
-    "a reference of nothing": (lambda: run(reference=Returning(None)), "the reference raised TypeError"),
-    "a reference that raises": (lambda: run(reference=Returning(OSError("far\naway"))), "raised OSError: far away"),
+    "a reference of nothing": (
+        lambda: run(reference=Returning(None)),
+        "the reference raised TypeError",
+    ),
+    "a reference that raises": (
+        lambda: run(reference=Returning(OSError("far\naway"))),
+        "raised OSError: far away",
+    ),
     "a reference that is a class": (lambda: run(reference=Step), "reference is the class Step"),
     "a step of two lengths": (lambda: Step([0, 0], [0, 0, 0]), "do not fit together"),
-    "gains of two batches": (lambda: PID(np.ones((3, 2)), np.ones((4, 2))), "gains are of batches of 3, 4"),
+    "gains of two batches": (
+        lambda: PID(np.ones((3, 2)), np.ones((4, 2))),
+        "gains are of batches of 3, 4",
+    ),
     "gains of another arm": (lambda: run(controller=PID([1, 2, 3])), "kp has 3 gains; expected 2"),
     "a limit in words": (lambda: PID(1.0, limit="a"), "limit"),
-    "many bandwidths, one wrong": (lambda: PID.tuned(SMALL, bandwidth=np.append(np.ones(1000), -1)), "for a batch"),
+    "many bandwidths, one wrong": (
+        lambda: PID.tuned(SMALL, bandwidth=np.append(np.ones(1000), -1)),
+        "for a batch",
+    ),
     "a slice of a batch": (lambda: many(keep="all")[0:2], "expected the number of one run"),
 }
 
@@ -346,7 +424,9 @@ def test_bandwidths_are_swept():
     for kind in (ComputedTorque, PDGravity, PID):
         batch = SMALL.simulate_batch(kind.tuned(SMALL, w), [0.2, 0.3], 0.1, [0.1, 0.2])
         for k, x in enumerate(w):
-            alone = SMALL.simulate(kind.tuned(SMALL, x), [0.2, 0.3], 0.1, [0.1, 0.2], restitution=None)
+            alone = SMALL.simulate(
+                kind.tuned(SMALL, x), [0.2, 0.3], 0.1, [0.1, 0.2], restitution=None
+            )
             assert np.allclose(batch.q[k], alone.q[-1], atol=1e-10)
 
 

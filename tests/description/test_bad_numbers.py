@@ -15,7 +15,11 @@ HEAD = 'format = 1\nname = "t"\nconvention = "standard"\n'
 
 def row(extra: str = "", **entries: str) -> str:
     own = {"a": "0.1", "alpha": "0", "d": "0", "theta": "0"} | entries
-    return '[[joint]]\ntype = "revolute"\n' + "".join(f"{key} = {value}\n" for key, value in own.items()) + extra
+    return (
+        '[[joint]]\ntype = "revolute"\n'
+        + "".join(f"{key} = {value}\n" for key, value in own.items())
+        + extra
+    )
 
 
 BODY = "body = {{ mass = {}, com = [{}, 0, 0], inertia = {{ xx = {}, yy = 1, zz = 1 }} }}\n"
@@ -30,15 +34,30 @@ REFUSED = {
     "inertia": (row(BODY.format(1, 0, "1e308")), "body.inertia: 1e+308"),
     "gear": (row("drive = { gear = 1e308, rotor_inertia = 1e308 }\n"), "drive.gear: 1e+308"),
     "limits": (row("limits = [-1e308, 1e308]\n"), "limits[0]: -1e+308"),
-    "a reciprocal of zero to rounding": (row(a='"1/(sin(1)^2 + cos(1)^2 - 1)"'), "divides by zero, to rounding"),
+    "a reciprocal of zero to rounding": (
+        row(a='"1/(sin(1)^2 + cos(1)^2 - 1)"'),
+        "divides by zero, to rounding",
+    ),
     "a share of it": (row(a='"1e-9/(sin(1)^2 + cos(1)^2 - 1)"'), "divides by zero, to rounding"),
     "a tower of powers": (row(a='"((1 + pi)^8)^8^2"'), "multiplies out to too many terms"),
     "roots and pi, raised": (row(a='"(((1/3 + pi)^9)^9)^9"'), "multiplies out to too many terms"),
-    "beyond doubles": (row(a='"(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9"'), "a: "),
+    "beyond doubles": (
+        row(a='"(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9*(pi^9)^9"'),
+        "a: ",
+    ),
     "a cycle": (CYCLE + row(a='"p0"'), "p0 -> p1 -> p2 -> ... -> p149 -> p0 is a cycle"),
-    "a long mesh name": (row(f'shape = {{ mesh = "{"x" * 5000}.stl" }}\n'), "expected a relative path"),
-    "a long component": (row(f'shape = {{ mesh = "{"x" * 400}.stl" }}\n'), "expected a relative path"),
-    "a loop of links": (row('shape = { mesh = "loop.stl" }\n'), "'loop.stl', which cannot be found"),
+    "a long mesh name": (
+        row(f'shape = {{ mesh = "{"x" * 5000}.stl" }}\n'),
+        "expected a relative path",
+    ),
+    "a long component": (
+        row(f'shape = {{ mesh = "{"x" * 400}.stl" }}\n'),
+        "expected a relative path",
+    ),
+    "a loop of links": (
+        row('shape = { mesh = "loop.stl" }\n'),
+        "'loop.stl', which cannot be found",
+    ),
 }
 
 
@@ -64,7 +83,11 @@ def test_a_mesh_that_is_a_pipe_is_a_warning(tmp_path):
     assert arm.urdf()
 
 
-@pytest.mark.parametrize(("text", "value"), [("1/1e-9", 1e9), ("1/(1 - cos(1e-3))", 1 / 4.999999583e-7)])
+@pytest.mark.parametrize(
+    ("text", "value"), [("1/1e-9", 1e9), ("1/(1 - cos(1e-3))", 1 / 4.999999583e-7)]
+)
 def test_small_divisors_are_divisors(text, value, tmp_path):
     (tmp_path / "robot.toml").write_text(HEAD + row(a=f'"{text}"'))
-    assert float(Arm.load(tmp_path / "robot.toml").description.numbers.a[0]) == pytest.approx(value, rel=1e-9)
+    assert float(Arm.load(tmp_path / "robot.toml").description.numbers.a[0]) == pytest.approx(
+        value, rel=1e-9
+    )

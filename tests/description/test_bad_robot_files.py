@@ -90,7 +90,9 @@ def refuse(path, complaint, law, folder=None):
     assert len(message) < 600
 
 
-@pytest.mark.parametrize("name", ["negative mass", "import", "10,000 brackets", "deeply nested TOML", "zero joints"])
+@pytest.mark.parametrize(
+    "name", ["negative mass", "import", "10,000 brackets", "deeply nested TOML", "zero joints"]
+)
 def test_the_command_says_so_with_status_2_and_writes_nothing(name, tmp_path, monkeypatch, capsys):
     (tmp_path / "bad.toml").write_text(BAD[name][0])
     monkeypatch.chdir(tmp_path)

@@ -46,7 +46,11 @@ def test_two_derivations_of_a_row_agree(name):
     q = np.linspace(-0.7, 0.9, robot.n)
     values = resolved(robot.parameters)
     rows = [
-        floats(with_values(tuple(map(tuple, fixed_row(joint, robot.convention, exact(float(x))))), values))
+        floats(
+            with_values(
+                tuple(map(tuple, fixed_row(joint, robot.convention, exact(float(x))))), values
+            )
+        )
         for joint, x in zip(robot.joints, q, strict=True)
     ]
     assert np.allclose(rows, link_transforms(robot, q), atol=ROUNDING)
@@ -68,7 +72,9 @@ def test_exact_poses_invert_and_read_back():
     assert np.allclose(floats(T @ inverse(T)), np.eye(4), atol=ROUNDING)
     assert placement_of(T) == placement == moved(placement, identity())
     assert np.allclose(matrix(placement, {}), check_pose(floats(T)), atol=ROUNDING)
-    assert np.allclose(pose((1, -2, 0.5), euler=(60, -30, 45), order="xyz", degrees=True), floats(T), atol=ROUNDING)
+    assert np.allclose(
+        pose((1, -2, 0.5), euler=(60, -30, 45), order="xyz", degrees=True), floats(T), atol=ROUNDING
+    )
 
 
 def test_a_path_stays_in_its_folder(tmp_path):
@@ -76,7 +82,9 @@ def test_a_path_stays_in_its_folder(tmp_path):
     assert inside(tmp_path, "a/b.stl", "mesh") == tmp_path / "a" / "b.stl"
     assert inside(None, "a/b.stl", "mesh") is None
     for path in ("../b.stl", "/b.stl", "a/../../b", "http://b", "", "x" * 501):
-        with pytest.raises(DescriptionError, match=r"a part is .*; expected a relative path inside the folder"):
+        with pytest.raises(
+            DescriptionError, match=r"a part is .*; expected a relative path inside the folder"
+        ):
             inside(tmp_path, path, "a part", "the folder")
     with pytest.raises(DescriptionError, match="a link that leaves the robot's folder"):
         inside(tmp_path, "out/etc", "mesh")
@@ -136,7 +144,9 @@ def test_values_replace_every_name():
 def test_text_and_data_of_a_robot_agree():
     robot = library_robot("polar_rp")
     document = plain_numbers(toml_document(toml_text(robot)))
-    assert [row["name"] for row in document["joint"]] == [joint.name for joint in data_of(robot).joints]
+    assert [row["name"] for row in document["joint"]] == [
+        joint.name for joint in data_of(robot).joints
+    ]
     again = from_toml(toml_text(robot), mesh_folder=robot.mesh_folder)
     assert isinstance(again, Description) and again == robot
     assert check(again) == again.warnings

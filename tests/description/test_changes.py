@@ -26,7 +26,10 @@ ROUNDED = 3e-15
 
 @given(tables())
 def test_base_and_tool_multiply_from_the_left_and_right(arm):
-    left, right = pose((1, 2, 3), euler=(0.1, 1.5, -2)), pose((0, -0.2, 0.1), euler=(3, np.pi / 2, 1), order="ZYX")
+    left, right = (
+        pose((1, 2, 3), euler=(0.1, 1.5, -2)),
+        pose((0, -0.2, 0.1), euler=(3, np.pi / 2, 1), order="ZYX"),
+    )
     bare = with_tool(with_base(arm, np.eye(4)), np.eye(4))
     q = states(arm, 3)
     moved = world_to_tool(with_tool(with_base(arm, left), right), q)
@@ -36,11 +39,15 @@ def test_base_and_tool_multiply_from_the_left_and_right(arm):
 def test_right_angles_of_a_tool_stay_exact():
     arm = with_tool(library_robot("puma560"), pose((0, 0, 0.1), euler=(0, 90, 0), degrees=True))
     assert arm.tool.placement.rpy[1] == PI / 2
-    assert np.array_equal(np.abs(arm.numbers.T_last_tool[:3, :3]), [[0, 0, 1], [0, 1, 0], [1, 0, 0]])
+    assert np.array_equal(
+        np.abs(arm.numbers.T_last_tool[:3, :3]), [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
+    )
     assert from_toml(to_toml(arm), mesh_folder=arm.mesh_folder) == arm
 
 
-@pytest.mark.parametrize("T", [np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan), np.ones((2, 4, 4))])
+@pytest.mark.parametrize(
+    "T", [np.eye(3), 2 * np.eye(4), np.full((4, 4), np.nan), np.ones((2, 4, 4))]
+)
 def test_what_is_no_pose_is_no_tool(T):
     for change in (with_tool, with_base):
         with pytest.raises(ValueError, match="pose"):
@@ -64,7 +71,9 @@ def test_parameters_change_the_arm_and_nothing_else():
 
 
 def test_uniform_links_are_rods_between_the_frames():
-    arm = with_uniform_links(from_dh([(0, 0, "l1", 0), (0, 0, "l2", 0)], parameters={"l1": 0.5, "l2": 0.3}), [2, 1.5])
+    arm = with_uniform_links(
+        from_dh([(0, 0, "l1", 0), (0, 0, "l2", 0)], parameters={"l1": 0.5, "l2": 0.3}), [2, 1.5]
+    )
     first = arm.joints[0].body
     assert first.com[0].text == "-l1/2"
     assert first.inertia.zz.text == "l1^2*m1/12"
@@ -77,7 +86,9 @@ def test_uniform_links_are_rods_between_the_frames():
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_a_uniform_link_lies_halfway_between_its_ends_with_the_inertia_of_many_points(convention):
-    arm = from_dh([(0, 0.3, 0.2, "pi/2"), (0.4, 0.1, 0.5, 0.7), (0, 0.2, 0.1, 0)], convention=convention)
+    arm = from_dh(
+        [(0, 0.3, 0.2, "pi/2"), (0.4, 0.1, 0.5, 0.7), (0, 0.2, 0.1, 0)], convention=convention
+    )
     arm = with_uniform_links(with_tool(arm, pose((0.1, 0.2, 0.3))))
     T = world_to_frames(arm, np.zeros(3))
     ends = [*T[:, :3, 3], world_to_tool(arm, np.zeros(3))[:3, 3]]

@@ -60,7 +60,12 @@ def test_sizes_of_a_calibrated_arm_are_those_of_the_arm():
 def test_where_centres_lie_on_a_line_the_heights_are_in_the_middle():
     """Of two parallel axes the second has no height of its own: that of the centre before, and of the tool."""
     ends = link_ends(
-        np.array([1.0, 0.0]), np.zeros(2), np.ones(2), np.zeros(2), is_standard=True, tool=np.array([1.0, 0.0, 0.3])
+        np.array([1.0, 0.0]),
+        np.zeros(2),
+        np.ones(2),
+        np.zeros(2),
+        is_standard=True,
+        tool=np.array([1.0, 0.0, 0.3]),
     )
     assert ends.end[0] == pytest.approx([0, 0, 0.1])
     assert ends.begin[1] == pytest.approx([-1, 0, 0.1])

@@ -55,7 +55,9 @@ def test_the_robots_are_there():
 
 
 def test_an_unknown_robot_is_named_with_what_comes_near():
-    with pytest.raises(DescriptionError, match="no robot 'puma56' in the library; did you mean 'puma560'"):
+    with pytest.raises(
+        DescriptionError, match="no robot 'puma56' in the library; did you mean 'puma560'"
+    ):
         library_robot("puma56")
     with pytest.raises(DescriptionError, match="there are adept_viper_s850, al5d"):
         library_robot("../../etc/passwd")
@@ -81,7 +83,11 @@ def test_a_robot_is_complete_and_says_where_it_comes_from(name):
 
 @pytest.mark.parametrize("name", sorted(set(EXPECTED) - PUBLISHED_BODIES))
 def test_assumed_bodies_are_possible(name):
-    assert not [warning for warning in library_robot(name).warnings if not warning.startswith("configurations.")]
+    assert not [
+        warning
+        for warning in library_robot(name).warnings
+        if not warning.startswith("configurations.")
+    ]
 
 
 @pytest.mark.parametrize("name", EXPECTED)
@@ -101,7 +107,9 @@ def test_the_motors_can_hold_the_arm(name):
         if numbers.prismatic[i]:
             load = -(axis @ weight.sum(axis=0))
         else:
-            load = -np.sum(np.cross(com[:, i:] - point[:, None], weight).sum(axis=1) * axis, axis=-1)
+            load = -np.sum(
+                np.cross(com[:, i:] - point[:, None], weight).sum(axis=1) * axis, axis=-1
+            )
         assert np.abs(load).max() < numbers.effort[i] / 1.5
 
 
@@ -109,7 +117,14 @@ def test_published_numbers_are_kept_as_published():
     puma = library_robot("puma560")
     assert puma.joints[0].d == exact(0.67183)
     assert [float(j.body.mass) for j in puma.joints] == [0, 17.4, 4.8, 0.82, 0.34, 0.09]
-    assert [float(j.drive.gear) for j in puma.joints] == [-62.6111, 107.815, -53.7063, 76.0364, 71.923, 76.686]
+    assert [float(j.drive.gear) for j in puma.joints] == [
+        -62.6111,
+        107.815,
+        -53.7063,
+        76.0364,
+        71.923,
+        76.686,
+    ]
     assert np.degrees(puma.numbers.lower).round(9).tolist() == [-160, -45, -225, -110, -100, -266]
     assert puma.joints[1].effort == exact(186.4)
     assert library_robot("puma560_cao").joints[3].d == exact(19.58) * exact(0.0254)
@@ -128,10 +143,14 @@ def test_every_number_of_the_collected_data_is_here():
         rows = robot["joints"]
         for key, ours in (("a", numbers.a), ("d", numbers.d), ("alpha", numbers.alpha)):
             assert np.allclose(ours, [row[key] for row in rows], rtol=0, atol=1e-12), (name, key)
-        assert np.allclose(numbers.theta, [row["theta"] + row["offset"] for row in rows], rtol=0, atol=1e-12)
+        assert np.allclose(
+            numbers.theta, [row["theta"] + row["offset"] for row in rows], rtol=0, atol=1e-12
+        )
         for i, row in enumerate(rows):
             if row["limits"] is not None:
-                assert np.allclose([numbers.lower[i], numbers.upper[i]], row["limits"], rtol=0, atol=1e-12)
+                assert np.allclose(
+                    [numbers.lower[i], numbers.upper[i]], row["limits"], rtol=0, atol=1e-12
+                )
             if "body" in row and name in PUBLISHED_BODIES:
                 assert numbers.mass[i] == row["body"]["mass"]
                 assert np.array_equal(numbers.com[i], row["body"]["com"])
@@ -151,8 +170,14 @@ def test_corkes_and_the_seeds_puma_are_the_same_kind_of_arm_with_other_numbers_a
     assert wrist[0][1] == pytest.approx(-0.15005, abs=ROUNDED)
     assert wrist[1][1] == pytest.approx(-0.17145, abs=ROUNDED)
     # Upper arm 17 in against 16.39 in, forearm 17 in against 19.58 in, 0.8 in of elbow offset against none.
-    assert (corke.joints[1].a, cao.joints[1].a) == (exact(17) * exact(0.0254), exact(-16.39) * exact(0.0254))
-    assert (corke.joints[3].d, cao.joints[3].d) == (exact(17) * exact(0.0254), exact(19.58) * exact(0.0254))
+    assert (corke.joints[1].a, cao.joints[1].a) == (
+        exact(17) * exact(0.0254),
+        exact(-16.39) * exact(0.0254),
+    )
+    assert (corke.joints[3].d, cao.joints[3].d) == (
+        exact(17) * exact(0.0254),
+        exact(19.58) * exact(0.0254),
+    )
     assert (float(corke.joints[2].a), cao.joints[2].a) == (0.0203, exact(0))
     # At zero Corke's upper arm points along +x0, the seed's along -x0 (its a2 is negative).
     elbow = [world_to_frames(arm, np.zeros(6))[2, 0, 3] for arm in (corke, cao)]
@@ -170,11 +195,23 @@ def with_lengths(arm, lengths):
 def test_the_seeds_table_is_corkes_with_its_own_lengths_and_three_joints_turned():
     """The same motion: q1, 180 - q2, 180 - q3, q4, -q5, q6."""
     inch = exact(0.0254)
-    lengths = {(0, "d"): 0, (1, "a"): 16.39, (2, "d"): 6.75, (2, "a"): 0, (3, "d"): 19.58, (5, "d"): 2.2}
-    corke = with_lengths(library_robot("puma560"), {key: exact(x) * inch for key, x in lengths.items()})
+    lengths = {
+        (0, "d"): 0,
+        (1, "a"): 16.39,
+        (2, "d"): 6.75,
+        (2, "a"): 0,
+        (3, "d"): 19.58,
+        (5, "d"): 2.2,
+    }
+    corke = with_lengths(
+        library_robot("puma560"), {key: exact(x) * inch for key, x in lengths.items()}
+    )
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (100, 6))
     turned = q * [1, -1, -1, 1, -1, 1] + [0, np.pi, np.pi, 0, 0, 0]
-    assert np.abs(world_to_tool(corke, turned) - world_to_tool(library_robot("puma560_cao"), q)).max() < 4 * ROUNDED
+    assert (
+        np.abs(world_to_tool(corke, turned) - world_to_tool(library_robot("puma560_cao"), q)).max()
+        < 4 * ROUNDED
+    )
 
 
 def test_the_seeds_table_as_printed_only_lifts_the_base():
@@ -186,7 +223,10 @@ def test_the_seeds_table_as_printed_only_lifts_the_base():
     z1 = world_to_frames(meant, q)[:, 1, :3, 2]
     shifted = world_to_tool(meant, q)[:, :3, 3] - d2 * z1
     assert np.abs(lowered - shifted).max() < 4 * ROUNDED
-    assert np.abs(world_to_tool(printed, q)[:, :3, :3] - world_to_tool(meant, q)[:, :3, :3]).max() < 4 * ROUNDED
+    assert (
+        np.abs(world_to_tool(printed, q)[:, :3, :3] - world_to_tool(meant, q)[:, :3, :3]).max()
+        < 4 * ROUNDED
+    )
 
 
 def test_the_modified_table_is_corkes_arm_with_its_offsets_on_the_other_side_and_three_joints_reversed():
@@ -202,13 +242,18 @@ def test_the_modified_table_is_corkes_arm_with_its_offsets_on_the_other_side_and
     lengths = {(0, "d"): 0, (2, "d"): -0.1501, (2, "a"): -0.0203, (3, "d"): 0.4331}
     same = with_lengths(corke, {key: exact(x) for key, x in lengths.items()})
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, (100, 6))
-    assert np.abs(world_to_tool(same, q * [1, -1, -1, 1, -1, 1]) - world_to_tool(akb, q)).max() < 4 * ROUNDED
+    assert (
+        np.abs(world_to_tool(same, q * [1, -1, -1, 1, -1, 1]) - world_to_tool(akb, q)).max()
+        < 4 * ROUNDED
+    )
 
 
 def test_the_seeds_option_2_is_a_planar_two_link_arm():
     """Tool at the wrist centre, waist and wrist frozen: links 2 and 3 in a vertical plane."""
     cao = library_robot("puma560_cao")
-    planar = lock(with_tool(cao, pose((0, 0, float(exact(-2.2) * exact(0.0254))))), {0: 0, 3: 0, 4: 0, 5: 0})
+    planar = lock(
+        with_tool(cao, pose((0, 0, float(exact(-2.2) * exact(0.0254))))), {0: 0, 3: 0, 4: 0, 5: 0}
+    )
     assert planar.n == 2
     assert [float(j.alpha) for j in planar.joints[:1]] == [0.0]
     l1, l2 = 0.416306, 0.497332

@@ -31,7 +31,8 @@ from random_arms import arms, states
 
 AGREES = 1e-12
 held_values = st.one_of(
-    st.sampled_from(["0", "pi/2", "-pi/2", "pi", "0.5", "pi/6"]), st.floats(-3, 3, allow_subnormal=False)
+    st.sampled_from(["0", "pi/2", "-pi/2", "pi", "0.5", "pi/6"]),
+    st.floats(-3, 3, allow_subnormal=False),
 )
 
 
@@ -64,11 +65,17 @@ def disagreement(arm, held, count=5):
         full[kept] = q
         errors = {"tool": np.abs(world_to_tool(ours, q) - world_to_tool(arm, full)).max() / reach}
         M, M_reference = (
-            np.array(pin.crba(m, d, q, pin.Convention.WORLD)) for m, d in ((model, data), (reference, reference_data))
+            np.array(pin.crba(m, d, q, pin.Convention.WORLD))
+            for m, d in ((model, data), (reference, reference_data))
         )
-        errors["mass matrix"] = np.abs(np.triu(M) - np.triu(M_reference)).max() / np.abs(M_reference).max()
+        errors["mass matrix"] = (
+            np.abs(np.triu(M) - np.triu(M_reference)).max() / np.abs(M_reference).max()
+        )
         weight = np.nansum(arm.numbers.mass) * np.linalg.norm(arm.numbers.gravity) * reach
-        g = [pin.computeGeneralizedGravity(m, d, q).copy() for m, d in ((model, data), (reference, reference_data))]
+        g = [
+            pin.computeGeneralizedGravity(m, d, q).copy()
+            for m, d in ((model, data), (reference, reference_data))
+        ]
         errors["gravity torque"] = np.abs(g[0] - g[1]).max() / max(weight, 1e-3)
         for key, error in errors.items():
             worst[key] = max(worst[key], error)
@@ -83,7 +90,8 @@ def test_library_robots_with_some_joints_held(name, law):
     for _ in range(law.samples(100)):
         count = rng.integers(1, arm.n)
         held = {
-            int(place): float(rng.choice([0, 0.3, -1.1, np.pi / 2, np.pi])) for place in rng.choice(arm.n, count, False)
+            int(place): float(rng.choice([0, 0.3, -1.1, np.pi / 2, np.pi]))
+            for place in rng.choice(arm.n, count, False)
         }
         for key, error in disagreement(arm, held, 2).items():
             law.holds(key, error, AGREES, (name, held))
@@ -144,7 +152,10 @@ def test_right_angles_and_numbers_stay_exact():
     assert [x.half_turns for x in arm.tool.placement.rpy] == [0, 0, 0]
     ours = lock(library_robot("puma560"), {1: "-pi/2"})
     assert ours.joints[0].a == exact(0)
-    assert all(joint.theta.half_turns is not None and joint.alpha.half_turns is not None for joint in ours.joints)
+    assert all(
+        joint.theta.half_turns is not None and joint.alpha.half_turns is not None
+        for joint in ours.joints
+    )
 
 
 @pytest.mark.slow
@@ -155,7 +166,10 @@ def test_parameters_stay_parameters():
     longer = lock(library_robot("planar3r"), {1: "pi/3"})
     q = states(longer, 10)
     full = np.insert(q, 1, np.pi / 3, axis=1)
-    assert np.abs(world_to_tool(longer, q) - world_to_tool(library_robot("planar3r"), full)).max() < AGREES
+    assert (
+        np.abs(world_to_tool(longer, q) - world_to_tool(library_robot("planar3r"), full)).max()
+        < AGREES
+    )
 
 
 def test_names_and_places_mean_the_same():
@@ -196,7 +210,11 @@ def test_shapes_move_with_their_links():
     where = {}
     for which, state in ((arm, full), (ours, q)):
         T = world_to_frames(which, state)
-        where[which.n] = {part.file.name: T[part.link] @ part.T_link_part for part in link_parts(which) if part.file}
+        where[which.n] = {
+            part.file.name: T[part.link] @ part.T_link_part
+            for part in link_parts(which)
+            if part.file
+        }
     for name, T in where[6].items():
         assert np.abs(where[3][name] - T).max() < AGREES
 
@@ -206,7 +224,9 @@ def test_a_payload_weighs_on_the_arm_as_pinocchio_says(law, arm, mass, seed):
     law.samples(1000)
     rng = np.random.default_rng(seed)
     com, points = rng.uniform(-0.2, 0.2, 3), rng.uniform(-0.1, 0.1, (4, 3))
-    tensor = sum(mass / 4 * (p @ p * np.eye(3) - np.outer(p, p)) for p in points - points.mean(axis=0))
+    tensor = sum(
+        mass / 4 * (p @ p * np.eye(3) - np.outer(p, p)) for p in points - points.mean(axis=0)
+    )
     tensor = (tensor + tensor.T) / 2
     loaded = pinocchio_model(with_payload(arm, mass, com, tensor))
     reference = pinocchio_model(arm)
@@ -214,9 +234,14 @@ def test_a_payload_weighs_on_the_arm_as_pinocchio_says(law, arm, mass, seed):
     reference.appendBodyToJoint(tool.parentJoint, pin.Inertia(mass, com, tensor), tool.placement)
     reach = max(1.0, arm.reach)
     for q in states(arm, 3):
-        M, M_reference = (np.triu(pin.crba(m, m.createData(), q, pin.Convention.WORLD)) for m in (loaded, reference))
+        M, M_reference = (
+            np.triu(pin.crba(m, m.createData(), q, pin.Convention.WORLD))
+            for m in (loaded, reference)
+        )
         law.holds("mass matrix", np.abs(M - M_reference).max() / np.abs(M_reference).max(), AGREES)
-        g, g_reference = (pin.computeGeneralizedGravity(m, m.createData(), q) for m in (loaded, reference))
+        g, g_reference = (
+            pin.computeGeneralizedGravity(m, m.createData(), q) for m in (loaded, reference)
+        )
         weight = (np.nansum(arm.numbers.mass) + mass) * 9.81 * reach
         law.holds("gravity torque", np.abs(g - g_reference).max() / weight, AGREES)
 
@@ -230,7 +255,11 @@ def test_a_payload_may_be_a_parameter_and_needs_a_body_to_join():
     with pytest.raises(DescriptionError, match="has no body to join"):
         with_payload(bare, 1.0)
     assert with_payload(with_uniform_links(bare), 1.0).numbers.mass[0] == 2.0
-    for bad, complaint in (((-1.0,), "-1 kg"), ((np.nan,), "not finite"), ((1.0, (0, 0, np.inf)), "not finite")):
+    for bad, complaint in (
+        ((-1.0,), "-1 kg"),
+        ((np.nan,), "not finite"),
+        ((1.0, (0, 0, np.inf)), "not finite"),
+    ):
         with pytest.raises(DescriptionError, match=complaint):
             with_payload(planar, *bad)
     with pytest.raises(DescriptionError, match="eigenvalue"):
@@ -263,7 +292,12 @@ def symbolic_arms(draw):
     )
     kinds = "".join(draw(st.sampled_from("RRP")) for _ in rows)
     parameters = {"th": 0.3, "d1": 0.2, "l1": 0.5, "l2": "l1 - 0.1", "al": 0.6}
-    arm = from_dh(rows, kinds=kinds, convention=draw(st.sampled_from(["standard", "modified"])), parameters=parameters)
+    arm = from_dh(
+        rows,
+        kinds=kinds,
+        convention=draw(st.sampled_from(["standard", "modified"])),
+        parameters=parameters,
+    )
     return with_uniform_links(arm)
 
 
@@ -285,5 +319,12 @@ def test_a_locked_arm_of_symbols_can_be_written_and_its_parameters_changed(law, 
             continue
         changed = with_parameters(ours, **{name: value})
         other = lock(with_parameters(arm, **{name: value}), held)
-        law.holds("tool", np.abs(world_to_tool(changed, q) - world_to_tool(other, q)).max(), AGREES, (held, name))
-        law.holds("masses", np.abs(changed.numbers.mass - other.numbers.mass).max(), AGREES, (held, name))
+        law.holds(
+            "tool",
+            np.abs(world_to_tool(changed, q) - world_to_tool(other, q)).max(),
+            AGREES,
+            (held, name),
+        )
+        law.holds(
+            "masses", np.abs(changed.numbers.mass - other.numbers.mass).max(), AGREES, (held, name)
+        )

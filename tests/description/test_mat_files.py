@@ -54,12 +54,19 @@ def test_structs_are_records_of_named_variables():
     np.testing.assert_array_equal(record["V"].value, np.eye(3))
     assert record["V"].name == "s.V"
     assert record["inner"].value[0]["deep"].value == 1.0
-    assert [(record["x"].value.item(), record["y"].value) for record in found["many"].value] == [(1.0, "a"), (2.0, "b")]
+    assert [(record["x"].value.item(), record["y"].value) for record in found["many"].value] == [
+        (1.0, "a"),
+        (2.0, "b"),
+    ]
 
 
 @pytest.mark.parametrize(
     ("value", "kind"),
-    [(1j * np.eye(2), "complex matrix"), (csc_matrix(np.eye(2)), "sparse matrix"), ([1, "a"], "cell")],
+    [
+        (1j * np.eye(2), "complex matrix"),
+        (csc_matrix(np.eye(2)), "sparse matrix"),
+        ([1, "a"], "cell"),
+    ],
 )
 def test_what_is_not_read_says_what_it_is(value, kind):
     variable = read(saved(x=np.array(value, dtype=object) if kind == "cell" else value))["x"]

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 
 from bad_robot_files import GOOD
-from dhkit.description import DHTable, Units, from_toml, library_robot, read_robot, robots, to_toml, write_robot
+from dhkit.description import (
+    DHTable,
+    Units,
+    from_toml,
+    library_robot,
+    read_robot,
+    robots,
+    to_toml,
+    write_robot,
+)
 from dhkit.errors import DescriptionError
 from dhkit.expressions import PI, exact
 from random_arms import arms
@@ -97,7 +106,11 @@ def test_a_library_robot_survives_writing_and_reading(name):
     assert hash(again) == hash(arm)
     assert to_toml(again) == text
     for joint, other in zip(arm.joints, again.joints, strict=True):
-        assert (str(joint.a), str(joint.d), str(joint.theta)) == (str(other.a), str(other.d), str(other.theta))
+        assert (str(joint.a), str(joint.d), str(joint.theta)) == (
+            str(other.a),
+            str(other.d),
+            str(other.theta),
+        )
 
 
 @given(arms())
@@ -140,7 +153,13 @@ def test_units_do_not_matter():
 
 def test_numbers_stay_as_they_were_written():
     text = to_toml(from_toml(INCHES_AND_DEGREES))
-    for line in ("a = 17\n", "alpha = 90\n", "d = 2.5\n", "limits = [-160, 160]\n", "com = [-8.5, 0, 1]"):
+    for line in (
+        "a = 17\n",
+        "alpha = 90\n",
+        "d = 2.5\n",
+        "limits = [-160, 160]\n",
+        "com = [-8.5, 0, 1]",
+    ):
         assert line in text
     assert "0.67183" in to_toml(library_robot("puma560"))
     assert 'a = "l1"' in to_toml(library_robot("planar2r"))
@@ -158,7 +177,9 @@ def test_a_file_is_written_whole(tmp_path):
 def test_decimals_are_not_rounded_to_doubles():
     text = INCHES_AND_DEGREES.replace("d = 2.5", "d = 0.1000000000000000000000000000001")
     arm = from_toml(text)
-    assert arm.joints[0].d != from_toml(INCHES_AND_DEGREES.replace("d = 2.5", "d = 0.1")).joints[0].d
+    assert (
+        arm.joints[0].d != from_toml(INCHES_AND_DEGREES.replace("d = 2.5", "d = 0.1")).joints[0].d
+    )
     assert from_toml(to_toml(arm)) == arm
 
 
@@ -175,10 +196,17 @@ def test_the_table_prints_as_people_expect():
 
 @pytest.mark.parametrize(
     ("line", "value"),
-    [("theta = q1", "q1"), ("a = 17*inch", "17*inch"), ("limits = [-1, pi/2]", "pi/2"), ("name = puma # x", "puma")],
+    [
+        ("theta = q1", "q1"),
+        ("a = 17*inch", "17*inch"),
+        ("limits = [-1, pi/2]", "pi/2"),
+        ("name = puma # x", "puma"),
+    ],
 )
 def test_expressions_without_quotes_get_a_hint(line, value):
-    with pytest.raises(DescriptionError, match=r"not TOML: .*; names and expressions are in quotes: ") as caught:
+    with pytest.raises(
+        DescriptionError, match=r"not TOML: .*; names and expressions are in quotes: "
+    ) as caught:
         from_toml(f"format = 1\n{line}\n")
     assert str(caught.value).endswith(f'"{value}"')
 
@@ -186,5 +214,8 @@ def test_expressions_without_quotes_get_a_hint(line, value):
 def test_a_file_may_write_the_joint_variable():
     text = to_toml(library_robot("planar2r"))
     written = iter(("q1", "q2"))
-    lines = [f'theta = "{next(written)}"' if line.startswith("theta") else line for line in text.split("\n")]
+    lines = [
+        f'theta = "{next(written)}"' if line.startswith("theta") else line
+        for line in text.split("\n")
+    ]
     assert from_toml("\n".join(lines)) == library_robot("planar2r")

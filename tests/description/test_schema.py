@@ -72,7 +72,11 @@ l1 = 0.5
 ready = [0.5]
 """
 CHANGES = [
-    *((f'name = "{own}"', f'name = "{name}"') for own in ("two", "first") for name in (" ", "a b", "<b>", "../x", "1")),
+    *(
+        (f'name = "{own}"', f'name = "{name}"')
+        for own in ("two", "first")
+        for name in (" ", "a b", "<b>", "../x", "1")
+    ),
     ('name = "two"', 'name = ""'),
     ("l1 = 0.5", '"a b" = 0.5'),
     ("l1 = 0.5", "_l = 0.5"),

@@ -63,7 +63,12 @@ bodies = [
 def test_bodies_survive_writing_and_reading():
     arm = from_toml(LOADED)
     rod, payload = arm.joints[1].bodies
-    assert (rod.name, payload.name, payload.com[0], payload.mass.text) == ("rod", "body 2", exact(0.1), "mp")
+    assert (rod.name, payload.name, payload.com[0], payload.mass.text) == (
+        "rod",
+        "body 2",
+        exact(0.1),
+        "mp",
+    )
     assert arm.warnings == ()
     again = from_toml(to_toml(arm))
     assert again == arm and again.digest == arm.digest and to_toml(again) == to_toml(arm)
@@ -97,12 +102,15 @@ def test_several_bodies_are_one_by_the_parallel_axis_theorem(count, seed):
     com = m @ c / m.sum()
     levers = c - com
     expected = sum(
-        tensor + w * (r @ r * np.eye(3) - np.outer(r, r)) for tensor, w, r in zip(tensors, m, levers, strict=True)
+        tensor + w * (r @ r * np.eye(3) - np.outer(r, r))
+        for tensor, w, r in zip(tensors, m, levers, strict=True)
     )
     assert np.abs(arm.numbers.mass - m.sum()).max() < ROUNDED
     assert np.abs(arm.numbers.com[0] - com).max() < ROUNDED
     assert np.abs(arm.numbers.inertia[0] - expected).max() < ROUNDED
-    assert np.array_equal(arm.numbers.inertia[0], [[float(x) for x in row] for row in arm.joints[0].body.inertia.rows])
+    assert np.array_equal(
+        arm.numbers.inertia[0], [[float(x) for x in row] for row in arm.joints[0].body.inertia.rows]
+    )
 
 
 def test_a_mass_that_is_zero_joins_as_nothing():
@@ -119,13 +127,18 @@ def test_a_payload_is_a_body_of_its_own():
     arm = with_tool(library_robot("planar2r"), pose((0.1, 0, 0)))
     loaded = with_payload(with_payload(arm, "m1/4"), 1, (0.2, 0, 0))
     assert [body.name for body in loaded.joints[1].bodies] == ["body 1", "payload", "payload 2"]
-    assert [body.com[0] for body in loaded.joints[1].bodies[1:]] == [exact(0.1), exact(Fraction(3, 10))]
+    assert [body.com[0] for body in loaded.joints[1].bodies[1:]] == [
+        exact(0.1),
+        exact(Fraction(3, 10)),
+    ]
     assert loaded.joints[0] == arm.joints[0]
     assert loaded.warnings == arm.warnings
     assert from_toml(to_toml(loaded)) == loaded
     for _ in range(13):
         loaded = with_payload(loaded, 1)
-    with pytest.raises(DescriptionError, match=r"joint 2 \(elbow\): 17 bodies; expected at most 16"):
+    with pytest.raises(
+        DescriptionError, match=r"joint 2 \(elbow\): 17 bodies; expected at most 16"
+    ):
         with_payload(loaded, 1)
 
 
@@ -139,7 +152,9 @@ def test_locking_keeps_bodies_apart_where_links_stay_apart():
     assert len(joined.joints[0].bodies) == 1
     assert joined.joints[0].body.mass.text == "m1 + m2 + 1"
     apart = with_payload(arm, 2)
-    whole = replace(apart, joints=tuple(replace(joint, bodies=(joint.body,)) for joint in apart.joints))
+    whole = replace(
+        apart, joints=tuple(replace(joint, bodies=(joint.body,)) for joint in apart.joints)
+    )
     for held in ({0: 0.3}, {1: "pi/3"}, {2: -1}):
         q = states(lock(apart, held), 4)
         ours, theirs = (Arm(lock(one, held)).mass_matrix(q) for one in (apart, whole))
@@ -149,7 +164,9 @@ def test_locking_keeps_bodies_apart_where_links_stay_apart():
 def test_what_is_no_set_of_bodies_is_refused():
     arm = from_toml(LOADED)
     many = replace(arm.joints[0], bodies=arm.joints[0].bodies * 17)
-    with pytest.raises(DescriptionError, match=r"joint 1 \(joint1\): 17 bodies; expected at most 16"):
+    with pytest.raises(
+        DescriptionError, match=r"joint 1 \(joint1\): 17 bodies; expected at most 16"
+    ):
         replace(arm, joints=(many, arm.joints[1]))
 
 

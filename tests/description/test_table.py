@@ -46,7 +46,10 @@ def test_arrays_and_letters():
         (dict(rows=[(0, 0, 0, 0)], kinds="RR"), "kinds is 'RR'; expected 1 letters"),
         (dict(rows=[(0, 0, 0, 0)], kinds="X"), "kinds is 'X'"),
         (dict(rows=[(0, 0, 0, 0)], order=("a", "d", "theta", "theta")), "order is"),
-        (dict(rows=[(0, 0, 0, 0)], convention="craig"), "convention is 'craig'; expected one of standard, modified"),
+        (
+            dict(rows=[(0, 0, 0, 0)], convention="craig"),
+            "convention is 'craig'; expected one of standard, modified",
+        ),
         (dict(rows=[(0, 0, 0, 0)], angle="grad"), "angle is 'grad'"),
         (dict(rows=[(0, 0, 0, 0)], length="ft"), "length is 'ft'"),
         (dict(rows=[(0, 0, 0, 0)], name="a/b"), "name: found 'a/b'"),
@@ -59,7 +62,10 @@ def test_what_is_no_table_is_said(arguments, complaint):
 
 def test_a_table_of_symbols_prints_symbols():
     arm = from_dh(
-        [("pi/3", "l1 + 3*mm", 0, 0.3), (0, 0, 0, 0)], kinds="RP", parameters={"l1": 1}, convention="modified"
+        [("pi/3", "l1 + 3*mm", 0, 0.3), (0, 0, 0, 0)],
+        kinds="RP",
+        parameters={"l1": 1},
+        convention="modified",
     )
     text = str(DHTable.of(arm))
     assert "q1 + 60°" in text
@@ -75,7 +81,10 @@ def test_a_table_of_symbols_prints_symbols():
 def test_rows_may_name_their_entries_and_write_the_joint_variable():
     """As a table is printed by arm.dh."""
     by_place = from_dh([(0, 0.3, 0, "pi/2"), ("-pi/2", 0, 0.2, 0)], kinds="RP")
-    by_name = from_dh([{"theta": "q1", "d": 0.3, "alpha": "pi/2"}, {"theta": "-pi/2", "d": "q2", "a": 0.2}], kinds="RP")
+    by_name = from_dh(
+        [{"theta": "q1", "d": 0.3, "alpha": "pi/2"}, {"theta": "-pi/2", "d": "q2", "a": 0.2}],
+        kinds="RP",
+    )
     assert by_name == by_place
     offset = from_dh([("q1 + pi/2", 0, 0.5, 0), ("q_2 - 0.1", 0, 0.5, 0)])
     assert offset.numbers.theta == pytest.approx([np.pi / 2, -0.1])
@@ -88,7 +97,10 @@ def test_rows_may_name_their_entries_and_write_the_joint_variable():
 
 def test_a_number_as_text_has_no_unit():
     """243.3 in a table of mm would be 243.3 m as an expression."""
-    with pytest.raises(DescriptionError, match=r"row 1: d: '243.3' is text without a unit; expected the number 243.3"):
+    with pytest.raises(
+        DescriptionError,
+        match=r"row 1: d: '243.3' is text without a unit; expected the number 243.3",
+    ):
         from_dh([(0, "243.3", 0, 0)], length="mm")
     with pytest.raises(DescriptionError, match=r"row 1: alpha: '90' is text .* such as 90\*deg"):
         from_dh([(0, 0, 1, "90")], angle="deg")
@@ -99,7 +111,9 @@ def test_a_number_as_text_has_no_unit():
 
 @pytest.mark.parametrize("entry", ["486.6/2", "243.3*1", "243.3 + 0", "(243.3)*(1)", "2.433e2"])
 def test_numbers_alone_as_text_are_refused_where_numbers_are_in_another_unit(entry):
-    with pytest.raises(DescriptionError, match=r"row 1: d: .* is text without a unit; .*\*mm; in parentheses"):
+    with pytest.raises(
+        DescriptionError, match=r"row 1: d: .* is text without a unit; .*\*mm; in parentheses"
+    ):
         from_dh([(0, entry, 0, 0)], length="mm")
     assert from_dh([(0, f"({entry})", 0, 0)], length="mm").numbers.d[0] == pytest.approx(243.3)
     assert from_dh([(0, entry, 0, 0)]).numbers.d[0] == pytest.approx(243.3)

@@ -123,7 +123,9 @@ def test_arguments_of_the_wrong_kind_are_refused(function, arm):
 def test_an_arm_without_bodies_says_what_to_do(function):
     arm = from_dh([(0, 0.1, 0.2, 0)] * 6)
     states = [np.zeros(6)] * FUNCTIONS[function][0]
-    with pytest.raises(DescriptionError, match=r"joints 1 \(joint1\), .* have no body.*with_uniform_links") as caught:
+    with pytest.raises(
+        DescriptionError, match=r"joints 1 \(joint1\), .* have no body.*with_uniform_links"
+    ) as caught:
         function(arm, *states)
     assert "\n" not in str(caught.value)
     assert function(with_uniform_links(arm), *states).shape == FUNCTIONS[function][1]
@@ -156,5 +158,7 @@ def test_power_and_friction(arm):
     assert np.allclose(friction_torque(arm, qd), numbers.viscous * qd + step, rtol=1e-14)
     moving = inverse_dynamics(arm, qd, qd, tau, friction=True) - inverse_dynamics(arm, qd, qd, tau)
     assert np.allclose(moving, friction_torque(arm, qd), rtol=0, atol=1e-12)
-    back = forward_dynamics(arm, qd, qd, inverse_dynamics(arm, qd, qd, tau, friction=True), friction=True)
+    back = forward_dynamics(
+        arm, qd, qd, inverse_dynamics(arm, qd, qd, tau, friction=True), friction=True
+    )
     assert np.allclose(back, tau, rtol=1e-10)

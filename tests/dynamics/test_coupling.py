@@ -34,8 +34,12 @@ def test_the_equations_are_those_of_the_published_subroutine(law):
     a, b = q[:, 1], q[:, 1] + q[:, 2]  # from the vertical
     s, c = np.sin, np.cos
     M = np.zeros((len(q), 3, 3))
-    reach = 0.25 * 60.3 * s(a) ** 2 + 2 * 0.5 * 12.1806 * s(a) * s(b)  # of joint 3's lever, about the vertical axis
-    links = 6.7759085 * s(a) ** 2 + 2.311496 * c(a) ** 2 + 8.1077564 * s(b) ** 2 + 0.4372752 * c(b) ** 2
+    reach = 0.25 * 60.3 * s(a) ** 2 + 2 * 0.5 * 12.1806 * s(a) * s(
+        b
+    )  # of joint 3's lever, about the vertical axis
+    links = (
+        6.7759085 * s(a) ** 2 + 2.311496 * c(a) ** 2 + 8.1077564 * s(b) ** 2 + 0.4372752 * c(b) ** 2
+    )
     M[:, 0, 0] = 1.16 + 14.3325 + links + reach
     M[:, 0, 1] = -2.45219 * c(a) - (0.0110568 + 0) * c(b) - 0.5 * 1.6884 * c(a)
     M[:, 0, 2] = -0.0110568 * c(b)
@@ -49,7 +53,9 @@ def test_the_equations_are_those_of_the_published_subroutine(law):
     gravity = np.zeros((len(q), 3))
     gravity[:, 2] = -9.81 * 12.1806 * s(b)
     gravity[:, 1] = gravity[:, 2] - 9.81 * (11.5825 + 0.5 * 60.3) * s(a)
-    law.holds("g of the Manutec r3", np.abs(Arm(MANUTEC).gravity_torque(q) - gravity).max() / 600, 1e-12)
+    law.holds(
+        "g of the Manutec r3", np.abs(Arm(MANUTEC).gravity_torque(q) - gravity).max() / 600, 1e-12
+    )
 
 
 def test_it_is_the_energy_of_a_rotor_that_two_joints_turn():
@@ -57,7 +63,9 @@ def test_it_is_the_energy_of_a_rotor_that_two_joints_turn():
     text = to_toml(library_robot("planar2r"))
     arm = from_toml(text.replace("[parameters]", "[parameters]\nJ = 0.002\nG = 50", 1))
     with_rotor = from_toml(
-        to_toml(arm).replace("rotor_inertia = 0", 'rotor_inertia = "J"').replace("gear = 1", 'gear = "G"')
+        to_toml(arm)
+        .replace("rotor_inertia = 0", 'rotor_inertia = "J"')
+        .replace("gear = 1", 'gear = "G"')
         + '[[coupling]]\njoints = [2, 1]\ninertia = "J*G"\n'
     )
     added = derive(with_rotor).K - derive_in(arm, with_rotor)
@@ -102,7 +110,10 @@ def test_numeric_regressors_leave_it_to_the_drives():
     B = arm.description.numbers.drive_inertia
     assert np.array_equal(B, B.T)
     assert np.allclose(np.diag(B), [14.3325, 57.33, 4.68], rtol=1e-15)
-    tau = regressor(MANUTEC, q, qd, qdd) @ arm.description.numbers.inertial_parameters.ravel() + B @ qdd
+    tau = (
+        regressor(MANUTEC, q, qd, qdd) @ arm.description.numbers.inertial_parameters.ravel()
+        + B @ qdd
+    )
     assert np.allclose(tau, arm.inverse_dynamics(q, qd, qdd), rtol=1e-13)
 
 
@@ -125,7 +136,11 @@ def test_locking_keeps_the_couplings_of_joints_that_move(locked, left, law):
     q[list(locked)] = list(locked.values())
     law.samples(1)
     M = Arm(MANUTEC).mass_matrix(q)[np.ix_(moving, moving)]
-    law.holds("M of the locked arm", np.abs(Arm(arm).mass_matrix(q[moving]) - M).max() / np.abs(M).max(), 1e-13)
+    law.holds(
+        "M of the locked arm",
+        np.abs(Arm(arm).mass_matrix(q[moving]) - M).max() / np.abs(M).max(),
+        1e-13,
+    )
 
 
 @pytest.mark.slow
@@ -134,8 +149,12 @@ def test_motions_and_controllers_know_it():
     arm = Arm(MANUTEC)
     ends = [arm.description.numbers.configurations[name] for name in ("start", "goal")]
     motion = arm.plan(*ends)
-    assert motion.duration == pytest.approx(0.4952, abs=2e-4)  # von Stryk & Schlemmer 1994: 0.49519 s
-    tau = arm.inverse_dynamics(*(getattr(motion, x)(motion.duration / 3) for x in ("q", "qd", "qdd")))
+    assert motion.duration == pytest.approx(
+        0.4952, abs=2e-4
+    )  # von Stryk & Schlemmer 1994: 0.49519 s
+    tau = arm.inverse_dynamics(
+        *(getattr(motion, x)(motion.duration / 3) for x in ("q", "qd", "qdd"))
+    )
     assert np.all(np.abs(tau) <= arm.description.numbers.effort * (1 + 1e-6))
     run = arm.simulate(ComputedTorque.tuned(arm), motion, saturation=False)
     assert np.abs(run.error).max() < 2e-3

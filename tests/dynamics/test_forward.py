@@ -21,7 +21,12 @@ def without_drives(arm):
 
 
 def with_bodies(arm, *bodies):
-    return replace(arm, joints=tuple(replace(j, bodies=(body,)) for j, body in zip(arm.joints, bodies, strict=True)))
+    return replace(
+        arm,
+        joints=tuple(
+            replace(j, bodies=(body,)) for j, body in zip(arm.joints, bodies, strict=True)
+        ),
+    )
 
 
 def point(mass, x):
@@ -32,7 +37,10 @@ def test_a_wrist_without_inertia_is_named():
     # The masses of UR3 and UR5 are often published without inertia.
     arm = without_drives(library_robot("ur3"))
     arm = with_bodies(arm, *(replace(joint.body, inertia=Inertia()) for joint in arm.joints))
-    with pytest.raises(DescriptionError, match=r"ur3: the mass matrix is singular: joint 6 \(\w+\) carries no inertia"):
+    with pytest.raises(
+        DescriptionError,
+        match=r"ur3: the mass matrix is singular: joint 6 \(\w+\) carries no inertia",
+    ):
         forward_dynamics(arm, np.zeros(6), np.zeros(6), np.zeros(6))
     assert np.all(np.isfinite(inverse_dynamics(arm, np.zeros(6), np.zeros(6), np.zeros(6))))
 
@@ -60,7 +68,10 @@ def test_angles_too_large_are_nan_without_a_warning(caplog):
     arm = library_robot("puma560")
     q = np.zeros((2, 6))
     q[1, 1] = 1e8
-    assert np.isnan(forward_dynamics(arm, q, np.zeros(6), np.zeros(6))).all(axis=1).tolist() == [False, True]
+    assert np.isnan(forward_dynamics(arm, q, np.zeros(6), np.zeros(6))).all(axis=1).tolist() == [
+        False,
+        True,
+    ]
     assert not caplog.records
 
 
@@ -68,7 +79,12 @@ def test_angles_too_large_are_nan_without_a_warning(caplog):
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_prismatic_joints_first_and_last_and_one_joint_arms(kinds, convention, law):
     law.samples(1000)
-    rows = [(0.3, 0.1, 0.2, "pi/2"), (0.0, 0.2, 0.0, -0.4), (0.7, 0.0, 0.1, "pi"), (0.1, 0.1, 0.3, 0.2)][: len(kinds)]
+    rows = [
+        (0.3, 0.1, 0.2, "pi/2"),
+        (0.0, 0.2, 0.0, -0.4),
+        (0.7, 0.0, 0.1, "pi"),
+        (0.1, 0.1, 0.3, 0.2),
+    ][: len(kinds)]
     arm = from_dh(rows, kinds=kinds, convention=convention)
     body = Body(
         exact(2),
@@ -77,7 +93,11 @@ def test_prismatic_joints_first_and_last_and_one_joint_arms(kinds, convention, l
     )
     arm = with_bodies(arm, *[body] * len(kinds))
     q, qd, x = motions(arm, 10)
-    ours = {"M": mass_matrix(arm, q), "tau": inverse_dynamics(arm, q, qd, x), "qdd": forward_dynamics(arm, q, qd, x)}
+    ours = {
+        "M": mass_matrix(arm, q),
+        "tau": inverse_dynamics(arm, q, qd, x),
+        "qdd": forward_dynamics(arm, q, qd, x),
+    }
     hold(law, arm, ours, q, qd, x, "of short arms")
 
 
@@ -91,9 +111,14 @@ def test_a_wrench_is_pinocchios_external_force(law):
         pin.framesForwardKinematics(model, data, q)
         at_tool = pin.SE3(np.eye(3), data.oMf[tool].translation)
         forces = pin.StdVec_Force([pin.Force.Zero() for _ in range(model.njoints)])
-        forces[model.njoints - 1] = data.oMi[model.njoints - 1].actInv(at_tool.act(pin.Force(wrench)))
+        forces[model.njoints - 1] = data.oMi[model.njoints - 1].actInv(
+            at_tool.act(pin.Force(wrench))
+        )
         theirs = pin.rnea(model, data, q, qd, qdd, forces)
-        error = np.abs(inverse_dynamics(arm, q, qd, qdd, wrench=wrench) - theirs).max() / np.abs(theirs).max()
+        error = (
+            np.abs(inverse_dynamics(arm, q, qd, qdd, wrench=wrench) - theirs).max()
+            / np.abs(theirs).max()
+        )
         law.holds("tau with a wrench against Pinocchio", error, 1e-12, q)
 
 

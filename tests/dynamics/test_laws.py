@@ -34,7 +34,11 @@ WEIGHTS = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
 def smooth_motion(arm, count):
     """Return q, qd, qdd of seven neighbouring times around each of N, shapes (N, 7, n)."""
     rng = np.random.default_rng(3)
-    size, rate, phase = rng.uniform(0.3, 1, arm.n), rng.uniform(0.3, 1, arm.n), rng.uniform(0, 6, arm.n)
+    size, rate, phase = (
+        rng.uniform(0.3, 1, arm.n),
+        rng.uniform(0.3, 1, arm.n),
+        rng.uniform(0, 6, arm.n),
+    )
     t = (rng.uniform(0, 10, (count, 1)) + STEP * np.arange(-3, 4))[..., None]
     angle = rate * t + phase
     return size * np.sin(angle), size * rate * np.cos(angle), -size * rate**2 * np.sin(angle)
@@ -65,7 +69,9 @@ def test_the_rate_of_M_less_2_C_is_skew(law, arm):
     M = mass_matrix(arm, q)
     q, qd = q[:, 3], qd[:, 3]
     S = derivative(M) - 2 * coriolis_matrix(arm, q, qd)
-    error = relative_error(S + np.swapaxes(S, 1, 2), np.zeros_like(S), np.abs(M[:, 3]).max(axis=(1, 2)))
+    error = relative_error(
+        S + np.swapaxes(S, 1, 2), np.zeros_like(S), np.abs(M[:, 3]).max(axis=(1, 2))
+    )
     law.holds("Mdot - 2 C, skew", error.max(), RATES, arm)
 
 
@@ -83,9 +89,13 @@ def test_terms_belong_together(law, arm):
     h = np.einsum("kij,kj->ki", C, qd)
     of_terms = np.einsum("kij,kj->ki", M, qdd) + h + g
     law.holds("M qdd + C qd + g", relative_error(tau, of_terms, floors.tau).max(), ROUNDINGS, arm)
-    law.holds("C qd + g", relative_error(bias(arm, q, qd), h + g, floors.bias).max(), ROUNDINGS, arm)
+    law.holds(
+        "C qd + g", relative_error(bias(arm, q, qd), h + g, floors.bias).max(), ROUNDINGS, arm
+    )
     K = np.einsum("ki,kij,kj->k", qd, M, qd) / 2
-    law.holds("K of M", relative_error(K, kinetic_energy(arm, q, qd), floors.h).max(), ROUNDINGS, arm)
+    law.holds(
+        "K of M", relative_error(K, kinetic_energy(arm, q, qd), floors.h).max(), ROUNDINGS, arm
+    )
     back = forward_dynamics(arm, q, qd, tau)
     error = relative_error(back, qdd, Floors.of(arm, M, qd, qdd, tau).qdd) / forward_tolerance(M)
     law.holds("forward of inverse, of the tolerance", error.max(), 1.0, arm)
@@ -107,8 +117,12 @@ def test_a_wrench_works_through_the_jacobian(law, arm):
     law.holds("tau with a wrench", error.max(), ROUNDINGS, arm)
     back = forward_dynamics(arm, q, qd, tau, wrench=wrench)
     tolerance = forward_tolerance(mass_matrix(arm, q))
-    error = relative_error(back, qdd, floors.qdd + scale / np.diagonal(mass_matrix(arm, q), 0, 1, 2).min(axis=1))
-    law.holds("forward of inverse with a wrench, of the tolerance", (error / tolerance).max(), 1.0, arm)
+    error = relative_error(
+        back, qdd, floors.qdd + scale / np.diagonal(mass_matrix(arm, q), 0, 1, 2).min(axis=1)
+    )
+    law.holds(
+        "forward of inverse with a wrench, of the tolerance", (error / tolerance).max(), 1.0, arm
+    )
 
 
 widths = st.one_of(st.none(), st.floats(1e-6, 10).map(Friction))

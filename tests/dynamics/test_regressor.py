@@ -28,10 +28,14 @@ def test_torques_are_linear_in_the_parameters(law, description):
     assert np.abs(tau - inverse_dynamics(description, *motion)).max() <= 1e-12 * size
     reference = PinocchioResults(pinocchio_model(description), motion).regressor()
     falling = float(np.linalg.norm(description.numbers.gravity))
-    law.holds("regressor against Pinocchio's", float(relative_error(Y, reference, falling).max()), 1e-12)
+    law.holds(
+        "regressor against Pinocchio's", float(relative_error(Y, reference, falling).max()), 1e-12
+    )
 
 
-@pytest.mark.parametrize("name", ["planar2r", "cart_pendulum", "stanford", slow_if(True, "puma560_akb")])
+@pytest.mark.parametrize(
+    "name", ["planar2r", "cart_pendulum", "stanford", slow_if(True, "puma560_akb")]
+)
 def test_the_exact_regressor_is_the_numeric_one(name):
     description = library_robot(name)
     found = exact_regressor(lagrangian(description, "inertial"))

@@ -9,7 +9,9 @@ from dhkit.description import library_robot, robots
 from dhkit.dynamics import inverse_dynamics
 from dhkit.dynamics.torque_bounds import dry_friction_bounds, torque_derivative_bounds
 
-WITH_BODIES = [name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)]
+WITH_BODIES = [
+    name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)
+]
 DEGREE, DURATION = 5, 0.2
 STATES = {2: 401, 4: 41}
 """Number of states by the order of the derivative: differences of doubles lose digits where the states lie closer."""
@@ -25,12 +27,18 @@ def test_no_difference_exceeds_the_bound(name, order, law):
     t = np.linspace(0.0, DURATION, STATES[order])
     for trial in range(law.samples(50)):
         size = rng.choice([0.1, 1.0, 3.0])
-        joints = [np.polynomial.Polynomial(row) for row in rng.normal(size=(arm.n, DEGREE + 1)) * size]
-        motion = np.stack([[p.deriv(m)(t) if m else p(t) for p in joints] for m in range(order + 3)])
+        joints = [
+            np.polynomial.Polynomial(row) for row in rng.normal(size=(arm.n, DEGREE + 1)) * size
+        ]
+        motion = np.stack(
+            [[p.deriv(m)(t) if m else p(t) for p in joints] for m in range(order + 3)]
+        )
         tau = inverse_dynamics(arm, *(motion[m].T for m in range(3)))
         seen = np.abs(np.diff(tau, order, axis=0)).max(axis=0) / (t[1] - t[0]) ** order
         bound = torque_derivative_bounds(arm, np.abs(motion).max(axis=2)[:, None, :])[0]
-        law.holds("difference over its bound, less 1", float(np.max(seen / bound)) - 1, ROUNDING, trial)
+        law.holds(
+            "difference over its bound, less 1", float(np.max(seen / bound)) - 1, ROUNDING, trial
+        )
 
 
 def test_no_fourth_derivative_of_friction_exceeds_its_bound(law):
@@ -43,7 +51,9 @@ def test_no_fourth_derivative_of_friction_exceeds_its_bound(law):
         width = 10 ** rng.uniform(-2, 0)
         speed, *others = rng.normal(size=5) * [10 ** rng.uniform(-2, 0.5), 1, 1, 1, 1]
 
-        def friction(t, width=width, forwards=forwards, backwards=backwards, terms=(speed, *others)):
+        def friction(
+            t, width=width, forwards=forwards, backwards=backwards, terms=(speed, *others)
+        ):
             v = sum(term * t**k / mpmath.factorial(k) for k, term in enumerate(terms))
             s = v / mpmath.sqrt(v * v + width * width)
             return (forwards - backwards) / 2 * s + (forwards + backwards) / 2 * s * s

@@ -10,7 +10,18 @@ import pytest
 from hypothesis import given, strategies as st
 
 from dhkit.errors import ExpressionError
-from dhkit.expressions import PI, Expression, arc_tangent, cos, exact, exact_angle, parse, sin, sqrt, substitute
+from dhkit.expressions import (
+    PI,
+    Expression,
+    arc_tangent,
+    cos,
+    exact,
+    exact_angle,
+    parse,
+    sin,
+    sqrt,
+    substitute,
+)
 
 NAMES = ("l1", "m1", "q")
 ROUNDED_ANGLE = 2e-15  # what rounding an angle of up to 8 rad moves its sine in the reference
@@ -20,7 +31,9 @@ rationals = st.fractions(min_value=-100, max_value=100, max_denominator=1000)
 
 @st.composite
 def expressions(draw):
-    leaf = st.one_of(rationals.map(Expression.number), st.sampled_from(NAMES).map(Expression.symbol), st.just(PI))
+    leaf = st.one_of(
+        rationals.map(Expression.number), st.sampled_from(NAMES).map(Expression.symbol), st.just(PI)
+    )
     combine = st.recursive(
         leaf,
         lambda inner: st.one_of(

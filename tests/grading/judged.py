@@ -5,7 +5,9 @@ from hypothesis import strategies as st
 from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.remarks import Note, NoteKind
 
-SIGN = Diagnosis("gravity_sign", "gravity has the wrong sign", "g", ("g1",), hint="look at the sign of V")
+SIGN = Diagnosis(
+    "gravity_sign", "gravity has the wrong sign", "g", ("g1",), hint="look at the sign of V"
+)
 REPORT = GradeReport(
     robot="planar2r",
     digest="abc123",
@@ -50,15 +52,22 @@ def reports(draw, words=readable):
             *(draw(words) for _ in range(3)),
             draw(st.none() | words),
             draw(words),
-            draw(st.none() | st.builds(Witness, st.dictionaries(words, numbers, max_size=2), numbers, numbers)),
+            draw(
+                st.none()
+                | st.builds(Witness, st.dictionaries(words, numbers, max_size=2), numbers, numbers)
+            ),
             draw(words),
         )
         for _ in range(draw(st.integers(0, 4)))
     ]
-    names = st.lists(st.sampled_from([entry.name for entry in entries] or ["M11"]), max_size=3).map(tuple)
+    names = st.lists(st.sampled_from([entry.name for entry in entries] or ["M11"]), max_size=3).map(
+        tuple
+    )
     mistake = st.none() | words
     diagnosis = st.builds(Diagnosis, mistake, words, words, names, words, st.tuples(words))
-    notes = st.builds(Note, st.sampled_from(NoteKind), words, st.lists(words, max_size=3).map(tuple))
+    notes = st.builds(
+        Note, st.sampled_from(NoteKind), words, st.lists(words, max_size=3).map(tuple)
+    )
     return GradeReport(
         *(draw(words) for _ in range(3)),
         tuple(entries),

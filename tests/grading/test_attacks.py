@@ -110,7 +110,13 @@ def prepared():
     V = f"{RIGHT_V} + 0.12345*m1"
     inverse = {"branches": [["atan2(py, px) - acos(px)", "acos(py)"]]}
     table = {"rows": [["q1", "0", "l1", "0"], ["q2 + 1", "0", "2*l2", "0"]]}
-    for answers in ({"V": V}, {"V": "m1"}, {"V": f"sqrt(m1^2) + {RIGHT_V}"}, {"ik": inverse}, {"dh": table}):
+    for answers in (
+        {"V": V},
+        {"V": "m1"},
+        {"V": f"sqrt(m1^2) + {RIGHT_V}"},
+        {"ik": inverse},
+        {"dh": table},
+    ):
         grade_answers(PLANAR, answers)
     for package in (dhkit.grading, dhkit.symbolic):
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
@@ -131,12 +137,18 @@ def watch(may_fork=False):
         if event in FORBIDDEN and not (may_fork and event in ("os.fork", "os.kill")):
             os._exit(EXECUTED)
         if event in ("compile", "exec"):
-            code = arguments[1] if event == "compile" else getattr(arguments[0], "co_filename", "<string>")
+            code = (
+                arguments[1]
+                if event == "compile"
+                else getattr(arguments[0], "co_filename", "<string>")
+            )
             if str(code).startswith("<") and not str(code).startswith("<frozen"):
                 os._exit(EXECUTED)
         if event == "open" and isinstance(arguments[0], str | bytes | os.PathLike):
             path, flags = os.fsdecode(arguments[0]), arguments[2] or 0
-            writes = flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) and not any(place in path for place in allowed)
+            writes = flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) and not any(
+                place in path for place in allowed
+            )
             if writes or SECRET.name in path or path.startswith("/etc/pass"):
                 os._exit(EXECUTED)
 
@@ -200,10 +212,22 @@ def test_the_watch_lets_honest_answers_pass():
 
 FLOODS = frozenset(
     [
-        *("closing braces", "closing brackets", "LaTeX braces", "transposes of a matrix", "many spaces"),
+        *(
+            "closing braces",
+            "closing brackets",
+            "LaTeX braces",
+            "transposes of a matrix",
+            "many spaces",
+        ),
         *("rows of rows", "many semicolons", "table of long sums", "names that flood a name"),
         *("names that flood an entry", "long key"),
-        *("Python's assignments", "LaTeX's dollars", "LaTeX's brackets", "LaTeX's rows", "LaTeX's comments"),
+        *(
+            "Python's assignments",
+            "LaTeX's dollars",
+            "LaTeX's brackets",
+            "LaTeX's rows",
+            "LaTeX's comments",
+        ),
     ]
 )
 """Attacks of half a second and more whose runs are ten times as long as their refusal needs."""
@@ -318,7 +342,11 @@ def test_endless_robots_cost_their_sheet_alone(folder, name):
     attack, honest = grade_all(find_sheets([folder]), grade, jobs=2, seconds=5.0, memory=MEMORY)
     assert time.monotonic() - begin < 2 * SECONDS
     assert attack.verdict in (Verdict.WRONG, Verdict.UNREADABLE)
-    assert attack.error.isprintable() and len(attack.error) <= LONGEST and "please report" not in attack.error
+    assert (
+        attack.error.isprintable()
+        and len(attack.error) <= LONGEST
+        and "please report" not in attack.error
+    )
     assert honest.verdict is Verdict.CORRECT
 
 
@@ -397,13 +425,18 @@ TAGS = {
     "markup": 'student = "[link=javascript:alert(1)]bob[/link]"',
 }
 ATTACKERS = {
-    **{f"tag-{name}.toml": sheet('V = "<script>alert(1)</script>"', more=tag) for name, tag in TAGS.items()},
+    **{
+        f"tag-{name}.toml": sheet('V = "<script>alert(1)</script>"', more=tag)
+        for name, tag in TAGS.items()
+    },
     "code.toml": sheet(f"V = {quoted(REFUSED['import'])}"),
     "bomb.toml": sheet(f"V = '{NINE}^60'"),
     "large.toml": attack("names that flood an entry", SHEETS["names that flood an entry"]),
     "exponentials.toml": sheet("V = 'exp(exp(exp(1e9)))'"),
     "link.toml": sheet(r"V = '\href{javascript:alert(1)}{m_1}'"),
-    "answer.toml": sheet('V = "[bold]m1[/bold] \\u001b[2J <img src=x onerror=alert(1)>"\nK = "=cmd|\'/c calc\'!A1"'),
+    "answer.toml": sheet(
+        'V = "[bold]m1[/bold] \\u001b[2J <img src=x onerror=alert(1)>"\nK = "=cmd|\'/c calc\'!A1"'
+    ),
     "=1+1.toml": sheet('V = "m1"'),
     "=cmd|'calc'!A1.toml": sheet('V = "m1"'),
     "<b onmouseover=alert(1)>.toml": sheet('V = "m1"'),
@@ -419,10 +452,24 @@ ATTACKERS = {
 
 def graded(folder, out, *options):
     """Return what the command says, and its status."""
-    command = [sys.executable, "-m", "dhkit", "grade", str(folder), "--jobs", "2", "--seconds", str(SECONDS)]
+    command = [
+        sys.executable,
+        "-m",
+        "dhkit",
+        "grade",
+        str(folder),
+        "--jobs",
+        "2",
+        "--seconds",
+        str(SECONDS),
+    ]
     environment = {**os.environ, "DHKIT_ATTACKED": "no"}
     return subprocess.run(
-        [*command, "-o", str(out), *options], capture_output=True, cwd=folder.parent, env=environment, timeout=300
+        [*command, "-o", str(out), *options],
+        capture_output=True,
+        cwd=folder.parent,
+        env=environment,
+        timeout=300,
     )
 
 
@@ -438,14 +485,19 @@ def classroom(tmp_path_factory):
     """A class of honest and hostile sheets, judged by the command."""
     root = tmp_path_factory.mktemp("school")
     folder = root / "class"
-    for name, text in {**{f"{name}.toml": text for name, (text, _) in HONEST.items()}, **ATTACKERS}.items():
+    for name, text in {
+        **{f"{name}.toml": text for name, (text, _) in HONEST.items()},
+        **ATTACKERS,
+    }.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         written(folder / name, text)
     (folder / "secret.toml").symlink_to(SECRET)
     os.mkfifo(folder / "pipe.toml")
     before = sorted(str(path) for path in root.rglob("*"))
     done = graded(folder, root / "out")
-    after = sorted(str(path) for path in root.rglob("*") if root / "out" not in (path, *path.parents))
+    after = sorted(
+        str(path) for path in root.rglob("*") if root / "out" not in (path, *path.parents)
+    )
     assert before == after
     return root, done
 
@@ -469,7 +521,9 @@ def test_the_honest_have_their_marks(classroom):
         alone = grade(root / "class" / f"{name}.toml")
         assert alone.verdict is verdict
         assert (rows[name]["verdict"], rows[name]["error"]) == (verdict.value, "")
-        assert float(rows[name]["points"]) == pytest.approx(marks(alone, Rubric()).points, abs=0.005)
+        assert float(rows[name]["points"]) == pytest.approx(
+            marks(alone, Rubric()).points, abs=0.005
+        )
         assert (root / "out" / "students" / f"{name}.html").is_file()
 
 
@@ -491,7 +545,9 @@ def test_no_cell_is_computed(classroom):
     assert any("=cmd" in cell for cell in cells)
     number = re.compile(r"[+-]?\d+(\.\d+)?")
     assert not [
-        cell for cell in cells if cell.strip()[:1] in tuple("=+-@|%\t\r") and cell and not number.fullmatch(cell)
+        cell
+        for cell in cells
+        if cell.strip()[:1] in tuple("=+-@|%\t\r") and cell and not number.fullmatch(cell)
     ]
     assert all(cell.isprintable() for cell in cells)
 
@@ -602,7 +658,12 @@ def test_the_terminal_is_commanded_by_nobody(classroom):
 
 def test_names_of_files_stay_in_the_folder(classroom):
     root, _ = classroom
-    assert {path.name for path in (root / "out").iterdir()} == {"students", "records", "marks.csv", "class.html"}
+    assert {path.name for path in (root / "out").iterdir()} == {
+        "students",
+        "records",
+        "marks.csv",
+        "class.html",
+    }
     for path in (root / "out").rglob("*"):
         assert re.fullmatch(r"[\w.-]+", path.name), path
         assert not path.name.startswith("."), path
@@ -613,7 +674,8 @@ def test_names_of_files_stay_in_the_folder(classroom):
 
 
 @pytest.mark.parametrize(
-    "attack", ["file that is not UTF-8", "long student", "long student of wide letters", "half a letter"]
+    "attack",
+    ["file that is not UTF-8", "long student", "long student of wide letters", "half a letter"],
 )
 def test_no_name_ends_a_batch(tmp_path, capfdbinary, attack):
     folder = tmp_path / "class"
@@ -621,16 +683,22 @@ def test_no_name_ends_a_batch(tmp_path, capfdbinary, attack):
     written(folder / "ada.toml", HONEST["ada"][0])
     match attack:
         case "file that is not UTF-8":
-            written(Path(os.fsdecode(os.fsencode(folder / "bad") + b"\xff.toml")), sheet('V = "m1"'))
+            written(
+                Path(os.fsdecode(os.fsencode(folder / "bad") + b"\xff.toml")), sheet('V = "m1"')
+            )
         case "long student":
             written(folder / "long.toml", sheet('V = "m1"', more=f'student = "{"x" * 3_000_000}"'))
         case "long student of wide letters":
-            written(folder / "long.toml", sheet('V = "m1"', more=f'student = "{chr(0x1D4B3) * 300}"'))
+            written(
+                folder / "long.toml", sheet('V = "m1"', more=f'student = "{chr(0x1D4B3) * 300}"')
+            )
         case "half a letter":
             cells = [{"cell_type": "code", "source": "\ud800 = 1\nV = \ud800"}]
             written(folder / "half.ipynb", json.dumps({"cells": cells}))
     robot = ("--robot", "planar2r") if attack == "half a letter" else ()
-    assert graded_here(folder, "-o", tmp_path / "out", *robot) in (1, 2), capfdbinary.readouterr().err.decode()
+    assert graded_here(folder, "-o", tmp_path / "out", *robot) in (1, 2), (
+        capfdbinary.readouterr().err.decode()
+    )
     rows = rows_of(tmp_path)
     assert len(rows) == 2
     assert next(row for row in rows if row["student"] == "ada")["verdict"] == "correct"
@@ -707,8 +775,38 @@ PIECES = (
         "0*",
         "(q1-q1)",
     ),
-    *("q1", "qdd2", "m1", "pi", "deg", "g", "c12", "s_{1+2}", "q[0]", "q(2)", "(t)", "nan", "inf", "lambda", "import"),
-    *("sin", "cos ", "tan(", "atan2(1,", "sqrt", "abs(", "sign(", "exp(", "min(1,", "Rational(", "S(", "diff(", "cot("),
+    *(
+        "q1",
+        "qdd2",
+        "m1",
+        "pi",
+        "deg",
+        "g",
+        "c12",
+        "s_{1+2}",
+        "q[0]",
+        "q(2)",
+        "(t)",
+        "nan",
+        "inf",
+        "lambda",
+        "import",
+    ),
+    *(
+        "sin",
+        "cos ",
+        "tan(",
+        "atan2(1,",
+        "sqrt",
+        "abs(",
+        "sign(",
+        "exp(",
+        "min(1,",
+        "Rational(",
+        "S(",
+        "diff(",
+        "cot(",
+    ),
     *(
         "\\frac",
         "\\frac{1}",
@@ -771,7 +869,9 @@ PIECES = (
 )
 SHEETS_FOLDER = Path(__file__).parent / "sheets"
 CORPUS = sorted(
-    path for path in (SHEETS_FOLDER / "planar2r").iterdir() if path.suffix in (".toml", ".py", ".m", ".tex", ".ipynb")
+    path
+    for path in (SHEETS_FOLDER / "planar2r").iterdir()
+    if path.suffix in (".toml", ".py", ".m", ".tex", ".ipynb")
 )
 LASTS = 300.0
 """Seconds by the clock that `make accept` goes on for."""
@@ -798,7 +898,9 @@ def mutations(draw, good):
                 other = draw(st.sampled_from(good))
                 text = text[:a] + other[draw(st.integers(0, len(other))) :]
             case 5:
-                text = text[:a] + draw(st.sampled_from(PIECES)) * draw(st.integers(2, 60)) + text[b:]
+                text = (
+                    text[:a] + draw(st.sampled_from(PIECES)) * draw(st.integers(2, 60)) + text[b:]
+                )
             case 6:
                 text = text[:a] + draw(st.text(max_size=4)) + text[b:]
     return text
@@ -810,23 +912,35 @@ def of_suffix(suffix):
 
 
 PROGRAMS = {
-    ".py": ["import numpy as np\nV = m1*l1 # a\nM = np.array([[1, 2],\n [3, 4]])\nh1 = V\nh2 = 2\n"],
-    ".m": ["% a\nsyms q1 q2\nV = m1*l1;\nM(1,1) = 2; M(1,2) = ...\n 3; M(2,2) = 4\ng = [m1; l1];\n"],
+    ".py": [
+        "import numpy as np\nV = m1*l1 # a\nM = np.array([[1, 2],\n [3, 4]])\nh1 = V\nh2 = 2\n"
+    ],
+    ".m": [
+        "% a\nsyms q1 q2\nV = m1*l1;\nM(1,1) = 2; M(1,2) = ...\n 3; M(2,2) = 4\ng = [m1; l1];\n"
+    ],
     ".tex": [
         "\\begin{align}\nV &= m_1 l_1 \\\\\nM &= \\begin{bmatrix} 1 & 2 \\\\ 2 & q_1 \\end{bmatrix}\n\\end{align}\n"
     ],
-    ".ipynb": [json.dumps({"cells": [{"cell_type": "code", "source": ["V = m1\n", "K = 2"]}], "metadata": {}})],
+    ".ipynb": [
+        json.dumps(
+            {"cells": [{"cell_type": "code", "source": ["V = m1\n", "K = 2"]}], "metadata": {}}
+        )
+    ],
 }
 CASES = st.one_of(
     st.tuples(st.just("entry"), mutations(GOOD)),
     st.tuples(st.just("entry"), st.text(max_size=60)),
     st.tuples(st.just("judged"), mutations(GOOD[:-5])),
     st.tuples(
-        st.just("inverse"), mutations((*GOOD[:-5], "atan2(py, px)", "acos((px^2+py^2-l1^2-l2^2)/(2*l1*l2)) + q1"))
+        st.just("inverse"),
+        mutations((*GOOD[:-5], "atan2(py, px)", "acos((px^2+py^2-l1^2-l2^2)/(2*l1*l2)) + q1")),
     ),
     st.tuples(st.just("table"), mutations(("q1", "q1 + pi/2", "l1*2", "-pi/2", "atan2(l1, l2)"))),
     st.tuples(st.just(".toml"), mutations(of_suffix(".toml"))),
-    *(st.tuples(st.just(suffix), mutations([*texts, *of_suffix(suffix)])) for suffix, texts in PROGRAMS.items()),
+    *(
+        st.tuples(st.just(suffix), mutations([*texts, *of_suffix(suffix)]))
+        for suffix, texts in PROGRAMS.items()
+    ),
 )
 
 
@@ -838,7 +952,11 @@ def tried(kind, text):
                 read(text, VOCABULARY)
     elif kind in ("judged", "inverse", "table"):
         rows = {"rows": [[text, "0", "l1", "0"], ["q2", "0", "l2", "0"]]}
-        answers = {"judged": {"V": text}, "inverse": {"ik": {"branches": [[text, "q1"]]}}, "table": {"dh": rows}}
+        answers = {
+            "judged": {"V": text},
+            "inverse": {"ik": {"branches": [[text, "q1"]]}},
+            "table": {"dh": rows},
+        }
         try:
             report = grade_answers(PLANAR, answers[kind])
         except AnswerError:
@@ -922,7 +1040,12 @@ def random_tokens(count, seed):
         suffix = rng.choice(sorted(TOKENS))
         tokens = rng.choices(TOKENS[suffix].split(), k=rng.randint(1, 14))
         text = "".join(token + rng.choice(" \n") for token in tokens)
-        yield suffix, rf"\begin{{align}} V &= {text}\end{{align}}" if suffix == ".tex" and rng.random() < 0.7 else text
+        yield (
+            suffix,
+            rf"\begin{{align}} V &= {text}\end{{align}}"
+            if suffix == ".tex" and rng.random() < 0.7
+            else text,
+        )
 
 
 def test_random_tokens_are_answers_or_are_refused(law, tmp_path):

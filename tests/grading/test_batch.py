@@ -24,7 +24,9 @@ pytestmark = pytest.mark.slow
 SHORT = 0.25  # seconds of processor time that a judge that hangs is given; four times as long on the clock
 LONG = 120.0  # seconds that nothing here takes, unless something is wrong
 
-forking = pytest.mark.skipif(not hasattr(os, "fork"), reason="no os.fork: sheets are judged in the process itself")
+forking = pytest.mark.skipif(
+    not hasattr(os, "fork"), reason="no os.fork: sheets are judged in the process itself"
+)
 
 
 def sheets(*names):
@@ -125,7 +127,11 @@ def test_what_goes_wrong_is_said_and_the_rest_goes_on(judge, error):
 
     seconds = SHORT if judge in (hang, spin) else LONG
     begin = time.monotonic()
-    reports = list(grade_all(sheets("a.toml", "bad.toml", "z.toml"), some, jobs=2, seconds=seconds, memory=GIGABYTE))
+    reports = list(
+        grade_all(
+            sheets("a.toml", "bad.toml", "z.toml"), some, jobs=2, seconds=seconds, memory=GIGABYTE
+        )
+    )
     assert time.monotonic() - begin < LONG / 2
     assert [report.student for report in reports] == ["a", "bad", "z"]
     assert [report.sheet for report in reports] == ["a.toml", "bad.toml", "z.toml"]
@@ -141,7 +147,9 @@ def test_reports_come_in_the_order_of_the_sheets(jobs):
 
     seen = []
     names = [f"{k}.toml" for k in range(8)]
-    reports = grade_all(sheets(*names), judge, jobs=jobs, progress=lambda done, total: seen.append((done, total)))
+    reports = grade_all(
+        sheets(*names), judge, jobs=jobs, progress=lambda done, total: seen.append((done, total))
+    )
     assert [report.entries[0].answer for report in reports] == [str(k) for k in range(8)]
     assert seen == [(k + 1, 8) for k in range(8)]
 
@@ -218,7 +226,9 @@ def test_later_processes_inherit_what_is_prepared():
     def judge(path):
         return replace(right(path), left_out=tuple(cache))
 
-    reports = grade_all(sheets("a.toml", "b.toml", "c.toml"), judge, prepare=lambda r: cache.append(r.student))
+    reports = grade_all(
+        sheets("a.toml", "b.toml", "c.toml"), judge, prepare=lambda r: cache.append(r.student)
+    )
     assert [report.left_out for report in reports] == [(), ("a",), ("a", "b")]
 
 
@@ -260,7 +270,9 @@ def test_who_is_slow_to_read_makes_nobody_late():
 
 @forking
 def test_no_process_to_be_had(monkeypatch):
-    monkeypatch.setattr(os, "fork", lambda: (_ for _ in ()).throw(BlockingIOError(11, "Resource unavailable")))
+    monkeypatch.setattr(
+        os, "fork", lambda: (_ for _ in ()).throw(BlockingIOError(11, "Resource unavailable"))
+    )
     (report,) = grade_all(sheets("a.toml"), right)
     assert report.error == "no process to judge it in: Resource unavailable"
 
@@ -269,7 +281,11 @@ def test_without_fork_in_the_process_itself(monkeypatch):
     monkeypatch.delattr(os, "fork", raising=False)
 
     def judge(path):
-        return stumble(path) if path.stem == "b" else replace(right(path), left_out=(str(os.getpid()),))
+        return (
+            stumble(path)
+            if path.stem == "b"
+            else replace(right(path), left_out=(str(os.getpid()),))
+        )
 
     first, second = grade_all(sheets("a.toml", "b.toml"), judge)
     assert first.left_out == (str(os.getpid()),)
@@ -282,15 +298,28 @@ def test_limits_that_cannot_be():
 
 
 def test_files_are_taken_as_they_are_and_folders_searched(tmp_path):
-    for name in ("b.toml", "a.py", "c.txt", ".hidden.toml", "ada/q1.toml", "ada/deep/q2.m", ".git/x.toml", "one.txt"):
+    for name in (
+        "b.toml",
+        "a.py",
+        "c.txt",
+        ".hidden.toml",
+        "ada/q1.toml",
+        "ada/deep/q2.m",
+        ".git/x.toml",
+        "one.txt",
+    ):
         path = tmp_path / "class" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("[answer]\n")
     folder = tmp_path / "class"
     (folder / "robot.toml").write_text('format = 1\n[[joint]]\ntype = "revolute"\n')
     (folder / "rubric.toml").write_text("points = 10\n")
-    found = find_sheets([folder / "one.txt", folder, folder / "b.toml"], exclude=[folder / "rubric.toml"])
-    assert [(str(sheet.path.relative_to(folder)), sheet.student, sheet.error) for sheet in found] == [
+    found = find_sheets(
+        [folder / "one.txt", folder, folder / "b.toml"], exclude=[folder / "rubric.toml"]
+    )
+    assert [
+        (str(sheet.path.relative_to(folder)), sheet.student, sheet.error) for sheet in found
+    ] == [
         ("one.txt", "one", ""),
         ("a.py", "a", ""),
         ("ada/deep/q2.m", "ada", ""),
@@ -322,7 +351,9 @@ def test_files_alike_in_name_are_by_their_folders(tmp_path):
         file.parent.mkdir()
         file.touch()
     assert [sheet.student for sheet in find_sheets(files)] == ["ada", "bob"]
-    assert [sheet.student for sheet in find_sheets(files[:1])] == [""]  # what it says itself counts then
+    assert [sheet.student for sheet in find_sheets(files[:1])] == [
+        ""
+    ]  # what it says itself counts then
 
 
 def test_links_out_of_the_folder_are_not_followed(tmp_path):
@@ -331,8 +362,15 @@ def test_links_out_of_the_folder_are_not_followed(tmp_path):
     (tmp_path / "secret.toml").write_text("[answer]\n")
     (tmp_path / "secrets").mkdir()
     (folder / "inner" / "a.toml").write_text("[answer]\n")
-    links = {"out.toml": "../secret.toml", "gone.toml": "nothing", "within.toml": "inner/a.toml", "self.toml": "."}
-    for name, target in (links | {"folder": "../secrets", "back": "inner", "passwd": "/etc/passwd"}).items():
+    links = {
+        "out.toml": "../secret.toml",
+        "gone.toml": "nothing",
+        "within.toml": "inner/a.toml",
+        "self.toml": ".",
+    }
+    for name, target in (
+        links | {"folder": "../secrets", "back": "inner", "passwd": "/etc/passwd"}
+    ).items():
         (folder / name).symlink_to(target)
     assert {sheet.path.name: sheet.error for sheet in find_sheets([folder])} == {
         "folder": "a link out of the folder; it is not followed",
@@ -359,7 +397,8 @@ def test_no_sheets_and_too_many(tmp_path, monkeypatch):
     with pytest.raises(AnswerError, match="no such file"):
         find_sheets([tmp_path / "none.toml"])
     with pytest.raises(
-        AnswerError, match=r"no answer sheet; expected files that end in \.ipynb, \.m, \.py, \.tex, \.toml"
+        AnswerError,
+        match=r"no answer sheet; expected files that end in \.ipynb, \.m, \.py, \.tex, \.toml",
     ):
         find_sheets([tmp_path])
     for k in range(4):

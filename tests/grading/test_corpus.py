@@ -47,11 +47,20 @@ def test_the_corpus_is_large_enough():
     verdicts = Counter(label(path)[0] == "wrong" for path in CORPUS.values())
     robots = {path.parent.name for path in CORPUS.values()}
     assert verdicts[False] >= 60 and verdicts[True] >= 90 and sum(verdicts.values()) >= 150
-    assert robots >= {"planar2r", "planar3r", "polar_rp", "cart_pendulum", "pan_tilt", "cobra600", "puma3"}
+    assert robots >= {
+        "planar2r",
+        "planar3r",
+        "polar_rp",
+        "cart_pendulum",
+        "pan_tilt",
+        "cobra600",
+        "puma3",
+    }
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CORPUS]
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CORPUS],
 )
 def test_no_wrong_answer_is_accepted_and_no_right_one_rejected(name):
     expected, _ = label(CORPUS[name])

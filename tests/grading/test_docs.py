@@ -20,7 +20,9 @@ COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", PAGE, re.MULTILINE)
 
 
 def test_the_sheet_is_right():
-    report = judge_sheet(library_robot("planar2r"), sheet_of(tomllib.loads(SHEET, parse_float=Decimal)))
+    report = judge_sheet(
+        library_robot("planar2r"), sheet_of(tomllib.loads(SHEET, parse_float=Decimal))
+    )
     assert report.verdict.value == "correct", str(report)
 
 
@@ -41,7 +43,9 @@ def test_a_command_works(command, tmp_path, monkeypatch, capsys):
     for path in ("answer.toml", "submissions/ada/answer.toml", "submissions/bob.toml"):
         (tmp_path / path).write_text(SHEET)
     (tmp_path / "task.toml").write_text(TASK)
-    (tmp_path / "homework.m").write_text("V = m1*g*l1*sin(q(1))/2 + m2*g*(l1*sin(q(1)) + l2*sin(q(1) + q(2))/2);\n")
+    (tmp_path / "homework.m").write_text(
+        "V = m1*g*l1*sin(q(1))/2 + m2*g*(l1*sin(q(1)) + l2*sin(q(1) + q(2))/2);\n"
+    )
     (tmp_path / "homework.py").write_text(
         "V = sum(m*g*y for m, y in [(m1, l1*sin(q1)/2), (m2, l1*sin(q1) + l2*sin(q1 + q2)/2)])\n"
     )
@@ -62,4 +66,8 @@ def test_marks_may_change_afterwards(tmp_path, monkeypatch):
         assert exit.value.code == 0
     rows = [line.split(",") for line in (tmp_path / "out2" / "marks.csv").read_text().splitlines()]
     # Of M 4, C 2 and g 2 the sheet has no C.
-    assert [row[:3] for row in rows] == [["student", "points", "most"], ["ada", "15", "20"], ["bob", "15", "20"]]
+    assert [row[:3] for row in rows] == [
+        ["student", "points", "most"],
+        ["ada", "15", "20"],
+        ["bob", "15", "20"],
+    ]

@@ -15,10 +15,16 @@ from dhkit.grading import Verdict, grade
 from dhkit.grading.judging import functions
 
 ARM = Arm.load("planar2r")
-PENDULUM = Arm.from_dh([(0, 0, "l", 0)], order=("theta", "d", "a", "alpha"), kinds="R", parameters={"l": 0.5})
+PENDULUM = Arm.from_dh(
+    [(0, 0, "l", 0)], order=("theta", "d", "a", "alpha"), kinds="R", parameters={"l": 0.5}
+)
 K = "(m1*l1^2/6 + m2*l1^2/2)*qd1^2 + m2*l2^2/6*(qd1 + qd2)^2 + m2*l1*l2*c2/2*qd1*(qd1 + qd2)"
 V = "m1*g*l1/2*s1 + m2*g*(l1*s1 + l2/2*s12)"
-M11, M12, M22 = "(m1/3 + m2)*l1^2 + m2*l2^2/3 + m2*l1*l2*c2", "m2*l2^2/3 + m2*l1*l2*c2/2", "m2*l2^2/3"
+M11, M12, M22 = (
+    "(m1/3 + m2)*l1^2 + m2*l2^2/3 + m2*l1*l2*c2",
+    "m2*l2^2/3 + m2*l1*l2*c2/2",
+    "m2*l2^2/3",
+)
 G = ["(m1/2 + m2)*g*l1*c1 + m2*g*l2*c12/2", "m2*g*l2*c12/2"]
 H = ["-m2*l1*l2*s2*(qd1*qd2 + qd2^2/2)", "m2*l1*l2*s2*qd1^2/2"]
 SEEDS = range(5)
@@ -86,7 +92,14 @@ def forms(report):
     from rich.console import Console
 
     from dhkit.grading.marks import marks
-    from dhkit.grading.reports import gradescope, html_class, html_report, junit, marks_csv, terminal_report
+    from dhkit.grading.reports import (
+        gradescope,
+        html_class,
+        html_report,
+        junit,
+        marks_csv,
+        terminal_report,
+    )
     from dhkit.grading.rubric import Rubric
 
     sheet = marks(report, Rubric())
@@ -147,7 +160,17 @@ def test_derivatives_are_of_what_stands_there(text, expected):
 
 
 @pytest.mark.parametrize(
-    "text", ["dq/dt", r"\frac{dq}{dt}", "dtheta/dt", r"\frac{d\theta}{dt}", "dq1/dt", r"\dot q", "diff(q(t), t)", "q'"]
+    "text",
+    [
+        "dq/dt",
+        r"\frac{dq}{dt}",
+        "dtheta/dt",
+        r"\frac{d\theta}{dt}",
+        "dq1/dt",
+        r"\dot q",
+        "diff(q(t), t)",
+        "q'",
+    ],
 )
 def test_the_rate_of_an_arm_of_one_joint(text):
     assert PENDULUM.grade(A1=[[text] * 4] * 4).entries[0].read == "qd1"
@@ -183,7 +206,8 @@ def test_allowances_do_not_add_up(m22):
 
 
 @pytest.mark.parametrize(
-    "energy", ["1.000*g - 1.000*g", "0", "1000e0*m1*g*l1*s1 - 1000e0*m1*g*l1*s1", "0.0001*q1 - 0.0001*q1"]
+    "energy",
+    ["1.000*g - 1.000*g", "0", "1000e0*m1*g*l1*s1 - 1000e0*m1*g*l1*s1", "0.0001*q1 - 0.0001*q1"],
 )
 def test_nothing_is_no_rounded_energy(energy):
     assert verdict(V=energy) is Verdict.WRONG
@@ -205,7 +229,9 @@ def test_what_programs_print_is_right_within_rounding(number):
     assert verdict(M=[[M11, M12], [M12, number]]) in (Verdict.CORRECT, Verdict.ROUNDED)
 
 
-@pytest.mark.parametrize("number", ["0.080000000000001", "0.0800000000000010000", "0.07999999999999", "0.0800001"])
+@pytest.mark.parametrize(
+    "number", ["0.080000000000001", "0.0800000000000010000", "0.07999999999999", "0.0800001"]
+)
 def test_and_no_more_than_a_few_units_in_the_last_place(number):
     assert verdict(M=[[M11, M12], [M12, number]]) is Verdict.WRONG
 
@@ -232,7 +258,9 @@ def test_a_printed_zero():
     ],
 )
 def test_what_vanishes_near_zero_alone_is_found(text):
-    assert ARM.grade(V=text, explain=False, seed=50).verdict is Verdict.WRONG  # ten sets of parameters missed one here
+    assert (
+        ARM.grade(V=text, explain=False, seed=50).verdict is Verdict.WRONG
+    )  # ten sets of parameters missed one here
     for _ in SEEDS:
         assert verdict(V=text) is Verdict.WRONG
 
@@ -345,7 +373,9 @@ TAU = ["2*m1*l1^2*qdd1 + 2*m1*g*l1*c1 + {}*qd1", "m1*qdd2 + {}*qd2"]
 def test_friction_stays_a_symbol(tmp_path, first, second, mistake):
     report = rubbing(tmp_path, [TAU[0].format(first), TAU[1].format(second)])
     assert report.verdict is (Verdict.WRONG if mistake else Verdict.CORRECT), str(report)
-    assert [found.mistake for found in report.diagnosis] == ([mistake] if mistake else []), str(report)
+    assert [found.mistake for found in report.diagnosis] == ([mistake] if mistake else []), str(
+        report
+    )
 
 
 # 9. Numbers for parameters
@@ -358,7 +388,8 @@ def test_numbers_for_parameters_stand_in_every_form(g, tmp_path):
     written = forms(report)
     assert all("9.81" in form for form in written.values())
     assert all(
-        "judged at g = 9.81" in written[name] for name in ("terminal", "html", "class", "junit", "gradescope", "text")
+        "judged at g = 9.81" in written[name]
+        for name in ("terminal", "html", "class", "junit", "gradescope", "text")
     )
 
 
@@ -395,7 +426,15 @@ def test_statements_of_what_is_defined_everywhere():
 
 
 @pytest.mark.parametrize(
-    "length", ["sqrt(l1^2)", "abs(l1)", "l1*exp(0)", "sqrt(l1)^2", "max(l1, -l1)", "l1*cos(q1)^2 + l1*sin(q1)^2"]
+    "length",
+    [
+        "sqrt(l1^2)",
+        "abs(l1)",
+        "l1*exp(0)",
+        "sqrt(l1)^2",
+        "max(l1, -l1)",
+        "l1*cos(q1)^2 + l1*sin(q1)^2",
+    ],
 )
 def test_a_length_outside_the_ring_is_not_blamed(length):
     report = ARM.grade(dh={"rows": [["q1", "0", length, "0"], ["q2", "0", "l2", "0"]]})
@@ -445,8 +484,16 @@ LONG_PRODUCTS = [
 def test_long_products_are_decided_soon(text, law):
     start = time.perf_counter()
     assert verdict(explain=True, V=text) is Verdict.WRONG
-    assert verdict(explain=True, V=f"({text}) - ({text}) + {V}") in (Verdict.CORRECT, Verdict.UNDECIDED)
-    law.takes("seconds for two entries that are long to multiply out", time.perf_counter() - start, 8.0, text[:40])
+    assert verdict(explain=True, V=f"({text}) - ({text}) + {V}") in (
+        Verdict.CORRECT,
+        Verdict.UNDECIDED,
+    )
+    law.takes(
+        "seconds for two entries that are long to multiply out",
+        time.perf_counter() - start,
+        8.0,
+        text[:40],
+    )
 
 
 def hangs(q):
@@ -541,9 +588,18 @@ G_LATEX = ("(m_1/2 + m_2) g l_1 c_1 + m_2 g l_2 c_{12}/2", "m_2 g l_2 c_{12}/2")
         ({"g": ["g_2 = " + G[0], "g_1 = " + G[1]]}, Verdict.UNREADABLE),
         ({"V": rf"V = 3 = {V}"}, Verdict.CORRECT),
         ({"V": rf"V = {V} = 3"}, Verdict.WRONG),
-        ({"V": rf"\begin{{aligned}} V &= {V_LATEX[0]} \\ &\quad {V_LATEX[1]} \end{{aligned}}"}, Verdict.CORRECT),
-        ({"g": rf"\begin{{cases}} g_1 = {G_LATEX[0]} \\ g_2 = {G_LATEX[1]} \end{{cases}}"}, Verdict.CORRECT),
-        ({"g": rf"\begin{{cases}} g_2 = {G_LATEX[0]} \\ g_1 = {G_LATEX[1]} \end{{cases}}"}, Verdict.WRONG),
+        (
+            {"V": rf"\begin{{aligned}} V &= {V_LATEX[0]} \\ &\quad {V_LATEX[1]} \end{{aligned}}"},
+            Verdict.CORRECT,
+        ),
+        (
+            {"g": rf"\begin{{cases}} g_1 = {G_LATEX[0]} \\ g_2 = {G_LATEX[1]} \end{{cases}}"},
+            Verdict.CORRECT,
+        ),
+        (
+            {"g": rf"\begin{{cases}} g_2 = {G_LATEX[0]} \\ g_1 = {G_LATEX[1]} \end{{cases}}"},
+            Verdict.WRONG,
+        ),
         ({"V": f"m1 = {V}"}, Verdict.UNREADABLE),
         ({"V": f"q1 = {V}"}, Verdict.UNREADABLE),
     ],
@@ -587,7 +643,10 @@ def test_what_sympy_prints_over_several_lines(name, form):
 )
 def test_a_formula_over_several_lines_that_lost_its_spaces(change):
     M = ARM.lagrangian.sympy()["M"]
-    assert verdict(M=[[pretty(M[0, 0], change), M12], [M12, M22]]) in (Verdict.UNREADABLE, Verdict.CORRECT)
+    assert verdict(M=[[pretty(M[0, 0], change), M12], [M12, M22]]) in (
+        Verdict.UNREADABLE,
+        Verdict.CORRECT,
+    )
 
 
 def test_derivatives_over_several_lines():
@@ -699,7 +758,9 @@ def test_the_name_in_front_of_an_entry_is_the_entry(head):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("large", ["10^400", "exp(900)", "10^30*exp(q1)", "10^100*exp(q1)", "10^190*exp(q1)"])
+@pytest.mark.parametrize(
+    "large", ["10^400", "exp(900)", "10^30*exp(q1)", "10^100*exp(q1)", "10^190*exp(q1)"]
+)
 def test_digits_that_cancel_are_worked_out_again(large):
     assert verdict(V=f"({V} + {large}) - {large}") is Verdict.UNDECIDED
     assert verdict(V=f"({V} + m1*q1*10^-20 + {large}) - {large}") is Verdict.WRONG
@@ -709,9 +770,9 @@ def test_digits_that_cancel_are_worked_out_again(large):
 def test_a_state_that_sets_the_zero_is_as_exact_as_the_smallest_value_after_it():
     """With these seeds V is below 0.002 J where it is compared, and the digits of the first state are few."""
     for seed in (2, *range(20, 24)):
-        assert ARM.grade({"V": f"({V} + 10^30*exp(q1)) - 10^30*exp(q1)"}, explain=False, seed=seed).verdict is (
-            Verdict.UNDECIDED
-        )
+        assert ARM.grade(
+            {"V": f"({V} + 10^30*exp(q1)) - 10^30*exp(q1)"}, explain=False, seed=seed
+        ).verdict is (Verdict.UNDECIDED)
 
 
 IN_HALF_ANGLES = V.replace("s1", "(2*sin(q1/2)*cos(q1/2))", 1)

@@ -20,7 +20,16 @@ from grading.data import derive
 from grading.data.checking import states, trees
 from grading.data.layouts import matlab_file, python_file, tex_file, whole_texts
 from grading.data.rewriting import REWRITINGS, SLIPS, rewritten, slipped
-from grading.data.trees import DIGITS, NOTATIONS, Notation, evaluate, names_in, places, replaced, written
+from grading.data.trees import (
+    DIGITS,
+    NOTATIONS,
+    Notation,
+    evaluate,
+    names_in,
+    places,
+    replaced,
+    written,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -28,8 +37,29 @@ ROBOTS = Path(__file__).parent / "data" / "robots"
 ARMS = ("planar2r", "polar_rp", "cart_pendulum", "double_pendulum", "gantry", "craig2r")
 QUANTITIES = ("M", "h", "g", "V", "K", "tau")
 PLAIN = (
-    *("python", "dq1", "short_star", "matlab", "matlab_dots", "matlab_names", "numpy", "theta", "prime", "q1dot", "c"),
-    *("latex", "latex_short", "latex_q", "latex_bare", "latex_braces", "unicode", "mathematica", "maxima"),
+    *(
+        "python",
+        "dq1",
+        "short_star",
+        "matlab",
+        "matlab_dots",
+        "matlab_names",
+        "numpy",
+        "theta",
+        "prime",
+        "q1dot",
+        "c",
+    ),
+    *(
+        "latex",
+        "latex_short",
+        "latex_q",
+        "latex_bare",
+        "latex_braces",
+        "unicode",
+        "mathematica",
+        "maxima",
+    ),
 )
 SAMPLES = 20_000
 WHOLE = 0.3
@@ -37,7 +67,9 @@ WHOLE = 0.3
 DOCUMENTS = 0.2
 """Share of answers that stand in a document."""
 SAME, DIFFERENT = mpmath.mpf("1e-40"), mpmath.mpf("1e-20")
-WITHOUT_DIAGNOSIS = {"explain": False} if "explain" in inspect.signature(grade_answers).parameters else {}
+WITHOUT_DIAGNOSIS = (
+    {"explain": False} if "explain" in inspect.signature(grade_answers).parameters else {}
+)
 FILES_WITHOUT = {"explain": False} if "explain" in inspect.signature(grade).parameters else {}
 
 
@@ -100,13 +132,21 @@ def gap(quantity, mine, right, fixed=()):
 
 def as_text(answer, notation, rng):
     """Return an answer as the API takes it: text by entry, or one text of a matrix."""
-    if isinstance(answer, list) and rng.random() < WHOLE and notation.kind in ("latex", "matlab", "python"):
+    if (
+        isinstance(answer, list)
+        and rng.random() < WHOLE
+        and notation.kind in ("latex", "matlab", "python")
+    ):
         return whole_texts({"x": answer}, notation)["x"]
     return by_entry(answer, notation)
 
 
 def by_entry(answer, notation):
-    return [by_entry(one, notation) for one in answer] if isinstance(answer, list) else written(answer, notation)
+    return (
+        [by_entry(one, notation) for one in answer]
+        if isinstance(answer, list)
+        else written(answer, notation)
+    )
 
 
 def with_intermediate(text_of, answer, rng):
@@ -163,7 +203,10 @@ def drawn(rng):
 
 def shortest(failures):
     """The failures that are quickest to read."""
-    lines = [f"{name} {quantity} {what}: {verdict}\n    {text}" for name, quantity, what, verdict, text in failures]
+    lines = [
+        f"{name} {quantity} {what}: {verdict}\n    {text}"
+        for name, quantity, what, verdict, text in failures
+    ]
     return "\n" + "\n".join(sorted(lines, key=len)[:8])
 
 
@@ -221,13 +264,21 @@ def test_a_slip_never_passes(law, folder):
 def robot_names(name):
     """Return what a student of this arm may write."""
     one = derive.library()[name]
-    return [*one.values, *(f"{kind}{k + 1}" for kind in ("q", "qd", "qdd") for k in range(one.n)), "pi"]
+    return [
+        *one.values,
+        *(f"{kind}{k + 1}" for kind in ("q", "qd", "qdd") for k in range(one.n)),
+        "pi",
+    ]
 
 
 def numbers_of(name, answer):
     """Return the file's numbers of the parameters that an answer lacks: it is judged at these, and 1 may mean 1 kg."""
     used = set().union(*(names_in(entry(answer, path)) for path in entries(answer)))
-    return tuple((key, mpmath.mpf(str(value))) for key, value in ROBOT_VALUES[name].items() if key not in used)
+    return tuple(
+        (key, mpmath.mpf(str(value)))
+        for key, value in ROBOT_VALUES[name].items()
+        if key not in used
+    )
 
 
 ROBOT_VALUES = {name: robot.values for name, robot in derive.library().items()}

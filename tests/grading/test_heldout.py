@@ -147,7 +147,11 @@ def test_the_corpus_is_large_enough():
 
 def test_no_verdict_is_false(results, law):
     """No wrong sheet passes, no right one is called wrong or incomplete."""
-    false = [one for one in results if one.verdict != "unreadable" and one.verdict not in one.sheet["expected"]]
+    false = [
+        one
+        for one in results
+        if one.verdict != "unreadable" and one.verdict not in one.sheet["expected"]
+    ]
     law.size = len(results)
     law.holds("false verdicts", len(false), 0, listed(false))
 
@@ -160,10 +164,17 @@ def test_no_entry_is_misjudged(results, law):
 
 
 def test_hardly_a_sheet_is_unreadable(results, law):
-    unread = [one for one in results if one.verdict == "unreadable" and "unreadable" not in one.sheet["expected"]]
+    unread = [
+        one
+        for one in results
+        if one.verdict == "unreadable" and "unreadable" not in one.sheet["expected"]
+    ]
     law.size = len(results)
     law.holds(
-        "share of sheets that are not read", len(unread) / len(results), at_most(0.02, len(results)), listed(unread)
+        "share of sheets that are not read",
+        len(unread) / len(results),
+        at_most(0.02, len(results)),
+        listed(unread),
     )
 
 
@@ -172,7 +183,10 @@ def test_mistakes_are_named(results, law):
     unnamed = [one for one in wrong if not one.named]
     law.size = len(wrong)
     law.holds(
-        "share of mistakes that are not named", len(unnamed) / len(wrong), at_most(0.1, len(wrong)), listed(unnamed)
+        "share of mistakes that are not named",
+        len(unnamed) / len(wrong),
+        at_most(0.1, len(wrong)),
+        listed(unnamed),
     )
 
 
@@ -181,7 +195,12 @@ def test_the_names_are_right(results, law):
     other = [one for one in named if not one.named & set(one.label["accept"])]
     law.size = len(named)
     required = at_most(0.02, len(named))
-    law.holds("share of names that are another mistake's", len(other) / len(named), required, listed(other))
+    law.holds(
+        "share of names that are another mistake's",
+        len(other) / len(named),
+        required,
+        listed(other),
+    )
 
 
 def test_no_right_formula_is_blamed(results, law):

@@ -64,14 +64,29 @@ def test_points_by_weights_and_rules(rubric):
         "follows from V: 50 %",
     ]
     assert (given.points, given.most) == (47.5, 60)
-    assert [(mark.name, mark.points, mark.most) for mark in given.quantities] == [("M", 40, 40), ("g", 7.5, 20)]
+    assert [(mark.name, mark.points, mark.most) for mark in given.quantities] == [
+        ("M", 40, 40),
+        ("g", 7.5, 20),
+    ]
 
 
 def test_entries_are_weighed_however_their_names_are_written():
-    written = {"M_12": 0, "M1_10": 0, "A1_14": 0, "A114": 0, "A1014": 0, "tau_2": 0, "g10": 0, "M_1_10": 0, "A12": 1}
+    written = {
+        "M_12": 0,
+        "M1_10": 0,
+        "A1_14": 0,
+        "A114": 0,
+        "A1014": 0,
+        "tau_2": 0,
+        "g10": 0,
+        "M_1_10": 0,
+        "A12": 1,
+    }
     found = [next(iter(Rubric.from_data({"weights": {name: 0}}).weights)) for name in written]
     assert found == ["M12", "M1_10", "A114", "A114", "A1014", "tau2", "g10", "M1_10", "A12"]
-    one, other = (marks(REPORT, Rubric.from_data({"weights": {"M": 4, name: 0}})) for name in ("M12", "M_12"))
+    one, other = (
+        marks(REPORT, Rubric.from_data({"weights": {"M": 4, name: 0}})) for name in ("M12", "M_12")
+    )
     assert one == other
 
 
@@ -94,14 +109,26 @@ def test_a_weight_of_nothing_alone_leaves_the_others_equal():
     [
         ((), Credit(), 0),
         ((Diagnosis("gravity_sign", "", "g", ("g1",)),), Credit(diagnosed=0.3), 0.3),
-        ((Diagnosis("gravity_sign", "", "g", ("g1",)),), Credit(diagnosed=0.3, mistakes={"gravity_sign": 0.1}), 0.1),
-        ((Diagnosis("gravity_sign (link 2)", "", "g", ("g1",)),), Credit(mistakes={"gravity_sign": 0.1}), 0.1),
+        (
+            (Diagnosis("gravity_sign", "", "g", ("g1",)),),
+            Credit(diagnosed=0.3, mistakes={"gravity_sign": 0.1}),
+            0.1,
+        ),
+        (
+            (Diagnosis("gravity_sign (link 2)", "", "g", ("g1",)),),
+            Credit(mistakes={"gravity_sign": 0.1}),
+            0.1,
+        ),
         (
             (Diagnosis("a", "", "g", ("g1",), equivalent=("gravity_sign",)),),
             Credit(diagnosed=0.3, mistakes={"gravity_sign": 0.6}),
             0.6,
         ),
-        ((Diagnosis("a", "", "", ("g1",)), Diagnosis("b", "", "", ("g1",))), Credit(diagnosed=1), 0),
+        (
+            (Diagnosis("a", "", "", ("g1",)), Diagnosis("b", "", "", ("g1",))),
+            Credit(diagnosed=1),
+            0,
+        ),
         (
             (Diagnosis("a", "", "", ("g1",)), Diagnosis("b", "", "", ("g1",))),
             Credit(mistakes={"a": 0.7, "b": 0.4}),
@@ -122,7 +149,9 @@ def test_a_sheet_that_could_not_be_judged_gets_nothing():
     assert marks(replace(REPORT, error="crashed"), Rubric()).points == 0
 
 
-weights = st.dictionaries(st.sampled_from(("M", "g", "K", "M11", "g1", "V")), st.floats(0, 10), max_size=4)
+weights = st.dictionaries(
+    st.sampled_from(("M", "g", "K", "M11", "g1", "V")), st.floats(0, 10), max_size=4
+)
 
 
 @given(reports(), weights, st.floats(0.5, 1000))
@@ -138,7 +167,9 @@ def test_marks_add_up_and_stay_within_bounds(report, weights, points):
 @given(reports(), st.floats(0.1, 1000))
 def test_what_is_right_throughout_gets_all_points_exactly(report, points):
     right = replace(
-        report, error="", entries=tuple(replace(entry, verdict=Verdict.CORRECT) for entry in report.entries)
+        report,
+        error="",
+        entries=tuple(replace(entry, verdict=Verdict.CORRECT) for entry in report.entries),
     )
     assert marks(right, Rubric(points=points)).points == (points if report.entries else 0)
 
@@ -153,7 +184,10 @@ def test_what_is_right_throughout_gets_all_points_exactly(report, points):
         ("digits = 2", "digits: found 2; expected greater than or equal to 3"),
         ("feedback = 'some'", "feedback: found 'some'; expected 'full', 'hint' or 'verdict'"),
         ("[credit]\nroundign = 1", "credit: unknown key 'roundign'; did you mean 'rounding'?"),
-        ("[credit.mistakes]\na = 2", "credit.mistakes.a: found 2; expected less than or equal to 1"),
+        (
+            "[credit.mistakes]\na = 2",
+            "credit.mistakes.a: found 2; expected less than or equal to 1",
+        ),
         ("[weights]\nG = 1", "weights: no quantity 'G'; did you mean 'g'?"),
         ("[weights]\nK1 = 1", "weights: no quantity 'K1'; did you mean 'K'?"),
         ("[weights]\nM0 = 1", "weights: no quantity 'M0'; did you mean 'M'?"),
@@ -188,5 +222,8 @@ def test_hints_say_where_to_look_and_not_what_is_wrong():
 def test_verdicts_alone():
     told = with_feedback(REPORT, "verdict")
     assert [entry.verdict for entry in told.entries] == [entry.verdict for entry in REPORT.entries]
-    assert (told.diagnosis, {entry.latex + entry.statement + entry.follows for entry in told.entries}) == ((), {""})
+    assert (
+        told.diagnosis,
+        {entry.latex + entry.statement + entry.follows for entry in told.entries},
+    ) == ((), {""})
     assert "look at" not in str(told)

@@ -109,7 +109,9 @@ def is_read(tmp_path):
 
 def described(schema):
     """Yield the names of keys with their schemas, at every depth."""
-    for part in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+    for part in (
+        schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ()
+    ):
         yield from described(part)
     if isinstance(schema, dict) and schema.get("type") == "object":
         yield from schema.get("properties", {}).items()
@@ -151,13 +153,18 @@ def test_steps_of_an_empty_sheet_are_those_to_fill_in(tmp_path):
     path = tmp_path / "sheet.toml"
     head, steps = text.split("# [answer.ik]")
     path.write_text(
-        head + "\n".join(line.removeprefix("# ") for line in ("# [answer.ik]" + steps).splitlines()), "utf-8"
+        head
+        + "\n".join(line.removeprefix("# ") for line in ("# [answer.ik]" + steps).splitlines()),
+        "utf-8",
     )
     assert fits("sheet", path.read_text("utf-8"))
     assert "joint = 6" in path.read_text("utf-8")
     with pytest.raises(AnswerError, match="every entry is empty"):
         grade(path)
-    path.write_text(path.read_text("utf-8").replace('1, equation = ""', '1, equation = "px*s1 - py*c1 = d3"'), "utf-8")
+    path.write_text(
+        path.read_text("utf-8").replace('1, equation = ""', '1, equation = "px*s1 - py*c1 = d3"'),
+        "utf-8",
+    )
     report = grade(path)
     assert report.verdict is Verdict.INCOMPLETE
     earned = marks(report, Rubric())
@@ -176,8 +183,14 @@ def test_steps_of_an_empty_sheet_are_those_to_fill_in(tmp_path):
         ("task", ""),
         ("rubric", ""),
         ("sheet", "answer = { V = 0 }"),
-        ("sheet", "answer = { tau = '[0; 0]', G_2 = '0', m12 = 0, J_1_2 = 0, A1_14 = 'l1*c1', 'C_{11}' = 0 }"),
-        ("sheet", "answer = { A2 = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], V = [['m1']], g = [] }"),
+        (
+            "sheet",
+            "answer = { tau = '[0; 0]', G_2 = '0', m12 = 0, J_1_2 = 0, A1_14 = 'l1*c1', 'C_{11}' = 0 }",
+        ),
+        (
+            "sheet",
+            "answer = { A2 = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], V = [['m1']], g = [] }",
+        ),
         ("sheet", "answer = { dh = { rows = [[0, 0, 0, 0], ['q2', '0', 0.5, 'pi/2']] } }"),
         ("task", "task = { asked = ['dh', 'ik', 'A1', 'A1'] }"),
         ("rubric", "points = 0.5\nweights = { A1 = 1, A1_14 = 0, tau = 1e6 }"),

@@ -50,7 +50,10 @@ bodies = [
 xyz = ["l2", 0, 0]
 """
 V = "{m1}*g*l1/2*s1 + {m2}*g*(l1*s1 + lc*s12) + {mp}*g*(l1*s1 + {at}*s12)"
-G = ["({m1}*l1/2 + ({m2} + {mp})*l1)*g*c1 + ({m2}*lc + {mp}*{at})*g*c12", "({m2}*lc + {mp}*{at})*g*c12"]
+G = [
+    "({m1}*l1/2 + ({m2} + {mp})*l1)*g*c1 + ({m2}*lc + {mp}*{at})*g*c12",
+    "({m2}*lc + {mp}*{at})*g*c12",
+]
 M22 = "I2 + {m2}*lc^2 + {mp}*{at}^2"
 M12 = M22 + " + ({m2}*lc + {mp}*{at})*l1*c2"
 M11 = M22 + " + {m1}*l1^2/3 + ({m2} + {mp})*l1^2 + 2*({m2}*lc + {mp}*{at})*l1*c2"
@@ -86,8 +89,16 @@ def test_right_answers_are_right(arm):
     ("changed", "mistake", "sentence"),
     [
         ({"mp": "0"}, "payload_forgotten", "Link 2, payload: the payload is missing."),
-        ({"at": "lc"}, "payload_at_com", "Link 2, payload: the payload is placed at the link's centre of mass."),
-        ({"m1": "mp", "mp": "m1"}, "parameters_exchanged", "m1 and mp: two parameters are exchanged."),
+        (
+            {"at": "lc"},
+            "payload_at_com",
+            "Link 2, payload: the payload is placed at the link's centre of mass.",
+        ),
+        (
+            {"m1": "mp", "mp": "m1"},
+            "parameters_exchanged",
+            "m1 and mp: two parameters are exchanged.",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_payload_is_named(arm, quantities, changed, mistake, sentence):
@@ -98,7 +109,9 @@ def test_what_is_wrong_with_a_payload_is_named(arm, quantities, changed, mistake
     assert (diagnosis.mistake, diagnosis.sentence) == (mistake, sentence), str(report)
 
 
-@pytest.mark.parametrize(("quantities", "mistake"), [(("M",), "payload_not_moved"), (("V", "g"), "gravity_forgotten")])
+@pytest.mark.parametrize(
+    ("quantities", "mistake"), [(("M",), "payload_not_moved"), (("V", "g"), "gravity_forgotten")]
+)
 def test_a_payload_in_one_energy_only(arm, quantities, mistake):
     """The sheet's other quantities are right, so it is not missing altogether."""
     wrong = answers(mp="0")
@@ -109,13 +122,19 @@ def test_a_payload_in_one_energy_only(arm, quantities, mistake):
 def test_masses_on_one_link_exchanged_are_named(arm):
     """It is the same as their centres of mass exchanged."""
     report = arm.grade({"g": answers(m2="mp", mp="m2")["g"]})
-    assert {"parameters_exchanged (m2 and mp)", "parameters_exchanged (l2 and lc)"} <= named(report), str(report)
+    assert {"parameters_exchanged (m2 and mp)", "parameters_exchanged (l2 and lc)"} <= named(
+        report
+    ), str(report)
 
 
 def test_mistakes_at_one_body_are_found(arm):
     """Every mistake of the textbook at one body that changes gravity's torques is found, by this or an equal name."""
     truth = truth_of(arm.description)
-    at_bodies = [variant for variant in variants_of(truth, frozenset()).dynamic if variant.made.body is not None]
+    at_bodies = [
+        variant
+        for variant in variants_of(truth, frozenset()).dynamic
+        if variant.made.body is not None
+    ]
     assert {variant.made.body for variant in at_bodies} == {"arm", "payload"}
     found = 0
     for variant in at_bodies:

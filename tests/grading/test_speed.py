@@ -51,7 +51,9 @@ def _started():
 def test_a_right_entry(law):
     description = library_robot("planar2r")
     truth = truth_of(description)
-    answers = {quantity: written(truth.of(quantity), truth.arm(quantity)) for quantity in ("M", "g", "tau")}
+    answers = {
+        quantity: written(truth.of(quantity), truth.arm(quantity)) for quantity in ("M", "g", "tau")
+    }
     seconds, report = min((timed(description, answers) for _ in range(5)), key=lambda pair: pair[0])
     law.takes("a verdict, ms an entry", 1e3 * seconds / len(report.entries), 20)
 
@@ -60,7 +62,13 @@ def test_a_right_entry(law):
     ("robot", "quantities", "mistakes", "first", "then"),
     [
         ("planar2r", DYNAMICS, {MadeAt("half_forgotten", 2), "gravity_sign"}, 1.0, 0.1),
-        ("planar3r", DYNAMICS, {MadeAt("inertia_forgotten", 2), MadeAt("height_at_joint", 3)}, 5.0, 5.0),
+        (
+            "planar3r",
+            DYNAMICS,
+            {MadeAt("inertia_forgotten", 2), MadeAt("height_at_joint", 3)},
+            5.0,
+            5.0,
+        ),
         ("puma560", ("M",), {MadeAt("inertia_forgotten", 3)}, 30.0, 30.0),
     ],
 )
@@ -78,7 +86,13 @@ def test_a_sheet_with_its_full_diagnosis(robot, quantities, mistakes, first, the
 
 def command_line(*arguments):
     """Run `dhkit grade` in a new process; return the seconds that it takes, and the process."""
-    command = [sys.executable, "-c", "from dhkit.cli import main; main()", "grade", *map(str, arguments)]
+    command = [
+        sys.executable,
+        "-c",
+        "from dhkit.cli import main; main()",
+        "grade",
+        *map(str, arguments),
+    ]
     begin = time.perf_counter()
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     return time.perf_counter() - begin, result

@@ -17,7 +17,11 @@ CHUNK = 500_000
 
 def graph(name):
     x = casadi.SX.sym("x", 2)
-    y = casadi.vertcat(casadi.sin(x[0]), casadi.cos(x[0])) if name == "sincos" else casadi.atan2(x[0], x[1])
+    y = (
+        casadi.vertcat(casadi.sin(x[0]), casadi.cos(x[0]))
+        if name == "sincos"
+        else casadi.atan2(x[0], x[1])
+    )
     return Graph.of(name, {"parameters": casadi.SX(0, 1), "x": x}, {"y": y})
 
 
@@ -46,7 +50,9 @@ def check_sincos(law, x, where):
         error = np.abs(y[:, k] - exact)
         law.holds("sine and cosine, absolute", float(error.max()), SINE_ERROR, where)
         large = np.abs(exact) > SINE_ULP_ABOVE
-        law.holds("sine and cosine, ulp", float(ulps(y[large, k], exact[large]).max()), SINE_ULP, where)
+        law.holds(
+            "sine and cosine, ulp", float(ulps(y[large, k], exact[large]).max()), SINE_ULP, where
+        )
 
 
 def test_extended_precision_is_there_to_compare_with():
@@ -74,7 +80,9 @@ def test_sine_and_cosine_of_the_doubles_nearest_to_quarter_turns(law, mode):
 
 def test_beyond_the_exact_range(mode):
     """Right up to 1e6, NaN beyond, and NaN of what is not a number."""
-    x = np.concatenate([np.linspace(1e5, EXACT_RANGE, 10_001), -np.linspace(1e5, EXACT_RANGE, 10_001)])
+    x = np.concatenate(
+        [np.linspace(1e5, EXACT_RANGE, 10_001), -np.linspace(1e5, EXACT_RANGE, 10_001)]
+    )
     y = evaluate("sincos", np.stack([x, x], axis=1))
     assert np.abs(y[:, 0] - np.sin(x.astype(np.longdouble))).max() < SINE_ERROR
     beyond = np.array([np.nextafter(EXACT_RANGE, np.inf), -1e7, 1e300, np.inf, -np.inf, np.nan])
@@ -94,11 +102,26 @@ def test_arc_tangent(law, mode):
         count = min(CHUNK, total - start)
         xy = rng.normal(size=(count, 2)) * 10.0 ** rng.uniform(-12, 12, (count, 2))
         exact = np.arctan2(xy[:, 0].astype(np.longdouble), xy[:, 1].astype(np.longdouble))
-        law.holds("arc tangent, ulp", float(ulps(evaluate("atan2", xy)[:, 0], exact).max()), ATAN_ULP, mode)
+        law.holds(
+            "arc tangent, ulp",
+            float(ulps(evaluate("atan2", xy)[:, 0], exact).max()),
+            ATAN_ULP,
+            mode,
+        )
 
 
 def test_arc_tangent_of_axes_and_of_what_is_no_number(mode):
-    points = [(0, 1), (1, 0), (0, -1), (-1, 0), (0, 0), (-0.0, -1.0), (np.nan, 1), (1, np.nan), (5e-324, -1.0)]
+    points = [
+        (0, 1),
+        (1, 0),
+        (0, -1),
+        (-1, 0),
+        (0, 0),
+        (-0.0, -1.0),
+        (np.nan, 1),
+        (1, np.nan),
+        (5e-324, -1.0),
+    ]
     angles = evaluate("atan2", np.array(points, dtype=float))[:, 0]
     assert angles[:6].tolist() == [0, np.pi / 2, np.pi, -np.pi / 2, 0, np.pi]
     assert np.isnan(angles[6:8]).all()

@@ -86,7 +86,9 @@ print(json.dumps({"seconds": seconds, "numba": "numba" in sys.modules, "casadi":
 
 def measured(code, folder):
     environment = {**os.environ, "DHKIT_CACHE_DIR": str(folder), "DHKIT_KERNELS": "auto"}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -113,7 +115,11 @@ def test_single_states_and_small_batches(law, tmp_path):
 @pytest.mark.slow
 def test_no_small_batch_waits_for_the_compiler(law, tmp_path):
     law.samples(1)
-    law.takes("longest call beside a thread that compiles, s", measured(ARM + STALL, tmp_path)["longest"], 0.05)
+    law.takes(
+        "longest call beside a thread that compiles, s",
+        measured(ARM + STALL, tmp_path)["longest"],
+        0.05,
+    )
 
 
 @pytest.mark.slow

@@ -32,7 +32,9 @@ fresh = iter(range(10**9))
 def product_graph():
     a, x = casadi.SX.sym("a"), casadi.SX.sym("x", 3)
     y = casadi.if_else(x[0] > 0, a * x[1], casadi.sqrt(-x[0]))
-    return Graph.of("product", {"a": a, "x": x}, {"y": y, "bits": casadi.if_else(x[2] > 1, 5.0, 2.0)})
+    return Graph.of(
+        "product", {"a": a, "x": x}, {"y": y, "bits": casadi.if_else(x[2] > 1, 5.0, 2.0)}
+    )
 
 
 def product_kernel():
@@ -59,7 +61,9 @@ def cache(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("mode", ["auto", "on", "off"])
-@pytest.mark.parametrize("count", [0, 1, 7, 16, 17, 63, 64, 65, 100, 200, 2 * MIN_ITEMS_PER_THREAD + 5])
+@pytest.mark.parametrize(
+    "count", [0, 1, 7, 16, 17, 63, 64, 65, 100, 200, 2 * MIN_ITEMS_PER_THREAD + 5]
+)
 def test_a_kernel_computes_its_graph_for_any_number_of_items(count, mode, monkeypatch):
     set_mode(monkeypatch, mode)
     x = np.random.default_rng(count).normal(size=(count, 3))
@@ -176,7 +180,12 @@ def test_a_machine_that_cannot_compile_interprets(monkeypatch, caplog):
     for _ in range(2):
         y, _ = run_product(run, np.ones((COMPILE_AFTER, 3)))
         assert np.all(y == 2)
-    assert caplog.text.count("test_product is interpreted: it cannot be compiled here (no such processor)") == 1
+    assert (
+        caplog.text.count(
+            "test_product is interpreted: it cannot be compiled here (no such processor)"
+        )
+        == 1
+    )
 
 
 # Tiers agree
@@ -211,17 +220,25 @@ def test_tiers_agree_and_give_nan_for_the_same_states(name, monkeypatch):
         "jacobian_dot": (q, qd),
     }
     if name != "al5d":
-        quantities |= {"mass_matrix": (q,), "coriolis_matrix": (q, qd), "inverse_dynamics": (q, qd, qd)}
+        quantities |= {
+            "mass_matrix": (q,),
+            "coriolis_matrix": (q, qd),
+            "inverse_dynamics": (q, qd, qd),
+        }
         quantities |= {"gravity_torque": (q,), "kinetic_energy": (q, qd), "potential_energy": (q,)}
     for quantity, arguments in quantities.items():
         one, other = both(monkeypatch, partial(getattr(arm, quantity), *arguments))
         assert np.array_equal(np.isnan(one), np.isnan(other)), quantity
         scale = np.abs(np.delete(one, 6, axis=0)[9:]).max()
         rows = ~np.isin(np.arange(300), 6)  # 1e300 of a prismatic joint overflows in one of them
-        assert np.nanmax(np.abs(one[rows] - other[rows])[9:]) <= 10 * TIERS * max(1.0, scale), quantity
+        assert np.nanmax(np.abs(one[rows] - other[rows])[9:]) <= 10 * TIERS * max(1.0, scale), (
+            quantity
+        )
 
 
-@pytest.mark.parametrize("name", ["puma560", "puma560_cao", "ur3", "ur5", "irb140", "stanford", "cobra600", "al5d"])
+@pytest.mark.parametrize(
+    "name", ["puma560", "puma560_cao", "ur3", "ur5", "irb140", "stanford", "cobra600", "al5d"]
+)
 def test_tiers_give_the_same_inverse_kinematics_bit_for_bit(name, monkeypatch):
     """At singular poses and limits too, where a rounding decides what is valid, clamped and inside."""
     arm = library_robot(name)
@@ -260,7 +277,9 @@ def test_a_kernel_can_be_compiled_for_other_processors(processor):
     triple, _, features = machine_code.processor()
     if not triple.startswith("x86_64"):
         pytest.skip("names processors of that kind")
-    code = machine_code.compile_module(llvm_source(product_graph(), ("float64", "uint8")), (triple, processor, ""))
+    code = machine_code.compile_module(
+        llvm_source(product_graph(), ("float64", "uint8")), (triple, processor, "")
+    )
     if processor == "skylake-avx512" and "+avx512f" not in features:
         return
     if processor == "haswell" and "+avx2" not in features:
@@ -277,7 +296,9 @@ def test_text_that_is_no_kernel_is_refused():
     with pytest.raises(RuntimeError):
         machine_code.compile_module("define void @kernel(")
     with pytest.raises(RuntimeError, match="without a function"):
-        machine_code.CompiledFunction(machine_code.compile_module("define void @other() {\n  ret void\n}"))
+        machine_code.CompiledFunction(
+            machine_code.compile_module("define void @other() {\n  ret void\n}")
+        )
 
 
 @pytest.mark.parametrize("name", different_robots_first(robots()))
@@ -302,7 +323,9 @@ def test_arms_of_one_pattern_share_a_kernel():
     arm = dhkit.Arm.from_dh([(0, 0.3, 0.2, "pi/2"), (0, 0, 0.4, 0)])
     longer = dhkit.Arm.from_dh([(0, 0.5, 0.1, "pi/2"), (0, 0, 0.7, 0)])
     assert tool_kernel(arm.description)[0] is tool_kernel(longer.description)[0]
-    assert np.abs(longer.fk([0.1, 0.2]) - world_to_tool(longer.description, [0.1, 0.2])).max() < 1e-15
+    assert (
+        np.abs(longer.fk([0.1, 0.2]) - world_to_tool(longer.description, [0.1, 0.2])).max() < 1e-15
+    )
 
 
 def test_kinematics_agree_with_matrices_multiplied_in_numpy(compiled):
@@ -330,7 +353,9 @@ def test_a_signal_handler_that_calls_the_same_kernel_changes_nothing(count, mode
     before = signal.signal(signal.SIGALRM, handler)
     try:
         while len(calls) < 300:
-            if signal.getitimer(signal.ITIMER_REAL)[0] == 0:  # no period: a handler may last longer, and then nests
+            if (
+                signal.getitimer(signal.ITIMER_REAL)[0] == 0
+            ):  # no period: a handler may last longer, and then nests
                 signal.setitimer(signal.ITIMER_REAL, 2e-4)
             assert np.array_equal(arm.fk(q), expected)
     finally:
@@ -387,7 +412,11 @@ atexit.register(lambda: print(bool((arm.fk(q, threads=2) == T).all())))
 
 def test_threads_are_not_needed_when_the_interpreter_ends():
     done = subprocess.run(
-        [sys.executable, "-c", AFTER_THE_END], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-c", AFTER_THE_END],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
     )
     assert done.stdout == "True\n"
 

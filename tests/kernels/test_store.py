@@ -96,7 +96,10 @@ def damage(path, how):
     "how",
     [
         *("half", "one bit", "folder"),
-        *(pytest.param(x, marks=only_accepting) for x in ("empty", "longer", "Python", "number", "unreadable")),
+        *(
+            pytest.param(x, marks=only_accepting)
+            for x in ("empty", "longer", "Python", "number", "unreadable")
+        ),
     ],
 )
 def test_a_damaged_entry_is_made_anew(first, tmp_path, how):
@@ -112,7 +115,9 @@ def test_a_damaged_entry_is_made_anew(first, tmp_path, how):
 def test_every_source_that_can_matter_is_in_the_key(tmp_path, monkeypatch):
     """Among them what closed forms bake in: the numbers of statuses and flags."""
     root = tmp_path / "dhkit"
-    shutil.copytree(Path(store.__file__).parents[1], root, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    shutil.copytree(
+        Path(store.__file__).parents[1], root, ignore=shutil.ignore_patterns("__pycache__", "*.so")
+    )
     monkeypatch.setattr(store, "__file__", str(root / "kernels" / "store.py"))
 
     def key():
@@ -162,7 +167,8 @@ def test_a_folder_that_others_can_write_is_not_used(tmp_path, monkeypatch, caplo
 def test_a_user_that_does_not_exist_is_one_line(monkeypatch):
     monkeypatch.setenv("DHKIT_CACHE_DIR", "~nobody-of-this-name/x")
     with pytest.raises(
-        DhkitError, match=r"^DHKIT_CACHE_DIR is '~nobody-of-this-name/x': there is no such user; expected a folder$"
+        DhkitError,
+        match=r"^DHKIT_CACHE_DIR is '~nobody-of-this-name/x': there is no such user; expected a folder$",
     ):
         store.cache_folder()
     arm, q = Arm.load("planar2r").with_tool(np.eye(4) + 0.07 * np.eye(4, k=3)), np.zeros((64, 2))
@@ -194,8 +200,15 @@ def test_folders_and_entries_of_a_process_are_the_users_own(tmp_path):
     home = tmp_path / "home"
     home.mkdir(mode=0o700)
     code = "import os; os.umask(0); import dhkit; dhkit.Arm.load('planar2r').compile()"
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(("DHKIT_", "XDG_"))}
-    subprocess.run([sys.executable, "-c", code], env={**environment, "HOME": str(home)}, check=True, timeout=120)
+    environment = {
+        key: value for key, value in os.environ.items() if not key.startswith(("DHKIT_", "XDG_"))
+    }
+    subprocess.run(
+        [sys.executable, "-c", code],
+        env={**environment, "HOME": str(home)},
+        check=True,
+        timeout=120,
+    )
     assert len(assert_private(home)) > 10
 
 
@@ -266,7 +279,9 @@ def test_a_full_disk_means_memory_only(tmp_path):
     done = in_new_process(FULL + CALL, tmp_path)
     assert "kernels are not cached" in done.stderr
     assert os.strerror(errno.EFBIG) in done.stderr
-    assert not [path for path in tmp_path.rglob("*") if path.is_file()], "a half-written file was left"
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()], (
+        "a half-written file was left"
+    )
 
 
 THREADS = """
@@ -294,7 +309,10 @@ for large, small in results:
 def test_processes_and_threads_that_ask_for_the_same_new_kernel(tmp_path):
     environment = {**os.environ, "DHKIT_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", THREADS]
-    running = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    running = [
+        subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
     for process in running:
         _, errors = process.communicate(timeout=120)
         assert process.returncode == 0, errors
@@ -341,5 +359,7 @@ def test_machine_code_needs_no_symbols_from_outside(tmp_path):
     in_new_process("import dhkit; dhkit.Arm.load('puma560').compile()", tmp_path)
     for path in (tmp_path / "kernels").glob("*.kernel"):
         path.with_suffix(".o").write_bytes(path.read_bytes()[len(store._seal(b"")) :])
-        done = subprocess.run([nm, "-u", str(path.with_suffix(".o"))], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [nm, "-u", str(path.with_suffix(".o"))], capture_output=True, text=True, check=True
+        )
         assert done.stdout == "", path.name

@@ -39,7 +39,9 @@ def free_states(arm, count):
     q, numbers = states(arm, count), arm.numbers
     share = (q + np.pi) / (2 * np.pi)
     with np.errstate(invalid="ignore"):
-        return np.where(numbers.prismatic, numbers.lower + share * (numbers.upper - numbers.lower), q)
+        return np.where(
+            numbers.prismatic, numbers.lower + share * (numbers.upper - numbers.lower), q
+        )
 
 
 @pytest.mark.parametrize("name", BOUNDED)
@@ -60,7 +62,9 @@ def test_nothing_is_beyond_and_the_arm_comes_near(name):
 @pytest.mark.parametrize("name", [*SPHERICAL, "stanford", "ax12_arm", "al5d", "wide", "widest"])
 def test_a_boundary_has_one_side_that_is_reached(name):
     arm = {"wide": turntable(0.25), "widest": turntable(1.5)}.get(name) or library_robot(name)
-    to_wrist = np.vstack([classify(arm).fit.parameters.get("T_tool_wrist", np.eye(4)[:3]), [0, 0, 0, 1]])
+    to_wrist = np.vstack(
+        [classify(arm).fit.parameters.get("T_tool_wrist", np.eye(4)[:3]), [0, 0, 0, 1]]
+    )
     for boundary in boundaries(arm):
         across = np.tile(Axes.of(arm).direction(2), (len(boundary.section), 1))
         if boundary.name != "shoulder":
@@ -83,7 +87,14 @@ def test_a_boundary_has_one_side_that_is_reached(name):
 def turntable(a1):
     """Return an arm of links 0.9 m and 0.3 m on a turntable of radius a1, with a spherical wrist."""
     right = np.pi / 2
-    rows = [(0, 0, a1, right), (0, 0, 0.9, 0), (0, 0, 0, right), (0, 0.3, 0, right), (0, 0, 0, -right), (0, 0, 0, 0)]
+    rows = [
+        (0, 0, a1, right),
+        (0, 0, 0.9, 0),
+        (0, 0, 0, right),
+        (0, 0.3, 0, right),
+        (0, 0, 0, -right),
+        (0, 0, 0, 0),
+    ]
     return from_dh(rows)
 
 
@@ -92,7 +103,10 @@ def test_holes_that_the_arm_reaches_from_behind_are_none():
     assert [boundary.name for boundary in boundaries(turntable(0.0))] == ["outer", "inner"]
     assert [boundary.name for boundary in boundaries(turntable(0.25))] == ["outer", "inner"]
     assert [boundary.name for boundary in boundaries(library_robot("irb140"))] == ["outer"]
-    height = {a1: np.nanmax(section(turntable(a1), boundaries(turntable(a1))[1].section)[:, 0]) for a1 in (0.0, 0.25)}
+    height = {
+        a1: np.nanmax(section(turntable(a1), boundaries(turntable(a1))[1].section)[:, 0])
+        for a1 in (0.0, 0.25)
+    }
     assert height[0.0] == pytest.approx(0.6)
     assert height[0.25] == pytest.approx(0.6 - 0.25)
 
@@ -102,8 +116,12 @@ def test_published_reaches():
     arm = library_robot("planar2r")
     outer, inner = boundaries(arm)
     l1, l2 = arm.numbers.a
-    assert np.linalg.norm(outer.circle, axis=1) == pytest.approx(np.full(len(outer.circle), l1 + l2))
-    assert np.linalg.norm(inner.circle, axis=1) == pytest.approx(np.full(len(inner.circle), abs(l1 - l2)))
+    assert np.linalg.norm(outer.circle, axis=1) == pytest.approx(
+        np.full(len(outer.circle), l1 + l2)
+    )
+    assert np.linalg.norm(inner.circle, axis=1) == pytest.approx(
+        np.full(len(inner.circle), abs(l1 - l2))
+    )
 
 
 def test_what_has_no_boundary_in_closed_form_has_none():
@@ -120,7 +138,9 @@ def test_the_figure_of_a_workspace_draws_them(name):
     found = boundaries(arm)
     figure = dhkit.plot(workspace(arm, 500))
     views = figure.axes[:-1]
-    for boundary, curve in zip(found, [line.get_xydata() for line in views[0].lines[3:]], strict=True):
+    for boundary, curve in zip(
+        found, [line.get_xydata() for line in views[0].lines[3:]], strict=True
+    ):
         shown = section(arm, boundary.section) if len(views) == 2 else boundary.circle[:, :2]
         assert np.allclose(curve, shown, rtol=0, atol=BEYOND, equal_nan=True)
     names = [text.get_text() for text in figure.legends[0].get_texts()]

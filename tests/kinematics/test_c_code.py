@@ -45,8 +45,20 @@ def test_c_computes_the_same(name, tmp_path):
         if name != "panda":
             ours = arm.ik(T)
             B = len(ours)
-            found, distance, valid, flags, status = np.empty((B, arm.n)), *(np.empty(k) for k in (1, B, B, 1))
-            call(library[f"{name}_inverse_kinematics"], T, np.zeros(2), found, distance, valid, flags, status)
+            found, distance, valid, flags, status = (
+                np.empty((B, arm.n)),
+                *(np.empty(k) for k in (1, B, B, 1)),
+            )
+            call(
+                library[f"{name}_inverse_kinematics"],
+                T,
+                np.zeros(2),
+                found,
+                distance,
+                valid,
+                flags,
+                status,
+            )
             assert np.array_equal(valid.astype(bool), ours.valid)
             assert np.array_equal(flags, ours.flags)
             assert np.nanmax(np.abs(np.angle(np.exp(1j * (found - ours.q))))) < 1e-9

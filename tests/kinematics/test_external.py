@@ -17,7 +17,13 @@ from dhkit.kinematics.external import solve_externally
 CLOSES = 1e-10  # share of the reach and rad: what solve_externally promises
 
 # Two axes meet at the wrist only, axes 2 and 3 are not parallel: no closed form of ours, and one of ssik's.
-TWISTED = [(0, 0.3, 0, "pi/2"), (0, 0, 0.4, "pi/2"), (0, 0.1, 0, "pi/2"), (0, 0.4, 0, "pi/2"), (0, 0, 0, "pi/2")]
+TWISTED = [
+    (0, 0.3, 0, "pi/2"),
+    (0, 0, 0.4, "pi/2"),
+    (0, 0.1, 0, "pi/2"),
+    (0, 0.4, 0, "pi/2"),
+    (0, 0, 0, "pi/2"),
+]
 TWISTED = [*TWISTED, (0, 0.1, 0, 0)]
 
 
@@ -28,7 +34,10 @@ def ssik():
 
 def twisted():
     arm = from_dh(TWISTED, name="twisted")
-    return with_tool(with_base(arm, pose((0.1, 0.2, 0.3), euler=(0.3, 0.2, 0.1))), pose((0, 0.1, 0.2), euler=(1, 2, 3)))
+    return with_tool(
+        with_base(arm, pose((0.1, 0.2, 0.3), euler=(0.3, 0.2, 0.1))),
+        pose((0, 0.1, 0.2), euler=(1, 2, 3)),
+    )
 
 
 def poses(arm, count, seed=0):
@@ -98,9 +107,13 @@ def test_the_jaco_has_the_solutions_that_ssik_counts(ssik, law):
     q, T = poses(arm, law.samples(400))
     found = inverse_kinematics(arm, T)
     check(arm, found, T)
-    law.holds("rad to the joint values that made the pose", np.abs(found.nearest(q) - q).max(), 1e-6)
+    law.holds(
+        "rad to the joint values that made the pose", np.abs(found.nearest(q) - q).max(), 1e-6
+    )
     solver = external._solver(arm)
-    theirs = [len(solver.solve(goal, respect_limits=False)) for goal in T @ external._tool_axes(arm)]
+    theirs = [
+        len(solver.solve(goal, respect_limits=False)) for goal in T @ external._tool_axes(arm)
+    ]
     law.holds("solutions lost", np.max(theirs - found.valid.sum(axis=1)), 0)
 
 
@@ -136,16 +149,17 @@ def test_the_solver_is_prepared_once(ssik, caplog):
     with caplog.at_level(logging.INFO, logger="dhkit.kinematics.external"):
         solve_externally(arm, T)
         solve_externally(arm, T)
-    assert [record.message for record in caplog.records if record.name == "dhkit.kinematics.external"] == [
-        "preparing ssik for once, which may take a minute the first time"
-    ]
+    assert [
+        record.message for record in caplog.records if record.name == "dhkit.kinematics.external"
+    ] == ["preparing ssik for once, which may take a minute the first time"]
 
 
 def test_without_ssik_the_error_says_how_to_get_it_and_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "ssik", None)
     arm = from_dh([*TWISTED[:-1], (0, 0.321, 0, 0)], name="plain")
     with pytest.raises(
-        ModelError, match=r"plain is 6R: no closed form known; `\.venv/bin/pip install -e '\.\[ik\]'`.*ik_numeric"
+        ModelError,
+        match=r"plain is 6R: no closed form known; `\.venv/bin/pip install -e '\.\[ik\]'`.*ik_numeric",
     ):
         inverse_kinematics(arm, np.eye(4))
     assert Arm(arm).ik_numeric(forward_kinematics(arm, np.full(6, 0.3))).valid.all()
@@ -170,9 +184,21 @@ def test_arguments_that_do_not_fit_are_said():
 @pytest.mark.slow
 def test_what_ssik_misses_is_found_by_iteration(ssik):
     """The published table of the Kinova Gen3 Lite: of 200 poses 6 lacked the joint values that they were made of."""
-    rows = [(0, 0, 0, 243.3), (90, 0, 90, 30), (180, 280, 90, 20), (90, 0, 90, 245), (90, 0, 180, 57), (90, 0, 90, 235)]
+    rows = [
+        (0, 0, 0, 243.3),
+        (90, 0, 90, 30),
+        (180, 280, 90, 20),
+        (90, 0, 90, 245),
+        (90, 0, 180, 57),
+        (90, 0, 90, 235),
+    ]
     arm = Arm.from_dh(
-        rows, order=("alpha", "a", "theta", "d"), angle="deg", length="mm", convention="modified", name="gen3_lite"
+        rows,
+        order=("alpha", "a", "theta", "d"),
+        angle="deg",
+        length="mm",
+        convention="modified",
+        name="gen3_lite",
     )
     q = np.random.default_rng(0).uniform(-2.5, 2.5, (200, 6))[:: 1 if acceptance.ACCEPTING else 5]
     found = arm.ik(arm.fk(q))
@@ -180,14 +206,22 @@ def test_what_ssik_misses_is_found_by_iteration(ssik):
     regular = np.linalg.svd(arm.jacobian(q), compute_uv=False)[:, -1] > 1e-3
     assert not np.any(regular & (nearest > 1e-6))
     assert not found.complete and "may be incomplete" in repr(found)
-    closing = np.abs(arm.fk(np.where(found.valid[..., None], found.q, 0)) - arm.fk(q)[:, None]).max(axis=(2, 3))
+    closing = np.abs(arm.fk(np.where(found.valid[..., None], found.q, 0)) - arm.fk(q)[:, None]).max(
+        axis=(2, 3)
+    )
     assert closing[found.valid].max() < CLOSES
 
 
 def test_an_arm_that_ssik_refuses_is_solved_by_iteration(ssik):
     """Four axes meet in one point."""
     right = np.pi / 2
-    rows = [(0, 0, 0.3, -right), (0, 1.0, 0.4, right), (0, 0.65, 0, right), (0, 0, 0, right), (0, 0, 0, right)]
+    rows = [
+        (0, 0, 0.3, -right),
+        (0, 1.0, 0.4, right),
+        (0, 0.65, 0, right),
+        (0, 0, 0, right),
+        (0, 0, 0, right),
+    ]
     arm = Arm.from_dh([*rows, (0, 0, 0.15, -right)])
     T = arm.fk([0.3, 0.4, -0.5, 0.6, 0.7, 0.2])
     found = arm.ik(T)

@@ -20,7 +20,9 @@ def test_frames_are_rigid_and_their_product_is_the_tool(arm):
     assert np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max() < 1e-14
     A = link_transforms(arm, q)
     assert np.allclose(T[:, :-1] @ A, T[:, 1:], rtol=0, atol=1e-14)
-    assert np.allclose(T[:, -1] @ arm.numbers.T_last_tool, forward_kinematics(arm, q), rtol=0, atol=1e-14)
+    assert np.allclose(
+        T[:, -1] @ arm.numbers.T_last_tool, forward_kinematics(arm, q), rtol=0, atol=1e-14
+    )
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -55,7 +57,13 @@ def test_arrays_of_any_layout_are_read_and_never_written(function):
     expected = function(arm, q)
     frozen = q.copy()
     frozen.flags.writeable = False
-    for layout in (frozen, np.asfortranarray(q), np.repeat(q, 2, axis=1)[:, ::2], q.tolist(), q.astype(np.float32)):
+    for layout in (
+        frozen,
+        np.asfortranarray(q),
+        np.repeat(q, 2, axis=1)[:, ::2],
+        q.tolist(),
+        q.astype(np.float32),
+    ):
         assert np.abs(function(arm, layout) - expected).max() < 1e-6
     assert function(arm, arm.numbers.configurations["ready"]).shape == expected.shape[1:]
     assert function(arm, np.zeros(6, dtype=int)).shape == expected.shape[1:]
@@ -77,7 +85,11 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(function):
 @pytest.mark.parametrize(
     ("call", "error", "complaint"),
     [
-        (lambda arm: forward_kinematics(arm, np.zeros(5)), ValueError, r"q has shape \(5,\); expected \(\.\.\., 6\)"),
+        (
+            lambda arm: forward_kinematics(arm, np.zeros(5)),
+            ValueError,
+            r"q has shape \(5,\); expected \(\.\.\., 6\)",
+        ),
         (lambda arm: forward_kinematics(arm, 1.0), ValueError, r"q has shape \(\)"),
         (lambda arm: forward_kinematics(arm, "raedy"), ValueError, "no configuration 'raedy'"),
         (lambda arm: forward_kinematics(arm, [[1, 2], [3]]), TypeError, "expected numbers"),
@@ -85,10 +97,22 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(function):
         (lambda arm: forward_kinematics(arm, np.zeros(6) + 1j), TypeError, "expected numbers"),
         (lambda arm: forward_kinematics(arm, [None] * 6), TypeError, "expected numbers"),
         (lambda arm: forward_kinematics(arm, np.zeros(6), out=[1]), ValueError, "out is list"),
-        (lambda arm: jacobian(arm, np.zeros(6), frame="base"), ValueError, "expected 'world' or 'tool'"),
+        (
+            lambda arm: jacobian(arm, np.zeros(6), frame="base"),
+            ValueError,
+            "expected 'world' or 'tool'",
+        ),
         (lambda arm: jacobian_dot(arm, np.zeros(6), np.zeros(5)), ValueError, "qd has shape"),
-        (lambda arm: forward_kinematics(arm, np.zeros(6), out=np.zeros((3, 3))), ValueError, r"expected \(4, 4\)"),
-        (lambda arm: forward_kinematics(arm, np.zeros(6), out=np.zeros((4, 4), np.float32)), ValueError, "float64"),
+        (
+            lambda arm: forward_kinematics(arm, np.zeros(6), out=np.zeros((3, 3))),
+            ValueError,
+            r"expected \(4, 4\)",
+        ),
+        (
+            lambda arm: forward_kinematics(arm, np.zeros(6), out=np.zeros((4, 4), np.float32)),
+            ValueError,
+            "float64",
+        ),
         (lambda arm: forward_kinematics(arm, np.zeros(6), threads=0), ValueError, "threads is 0"),
     ],
 )
@@ -101,8 +125,12 @@ def test_corkes_published_poses():
     """Robotics Toolbox: the PUMA's wrist at qz and qr, with the waist's height 0.67183 m added."""
     arm = library_robot("puma560")
     zero, ready = arm.numbers.configurations["zero"], arm.numbers.configurations["ready"]
-    assert np.allclose(forward_kinematics(arm, zero)[:3, 3], [0.4521, -0.15005, 0.4318 + 0.67183], atol=1e-15)
-    assert np.allclose(forward_kinematics(arm, ready)[:3, 3], [0.0203, -0.15005, 0.8636 + 0.67183], atol=1e-15)
+    assert np.allclose(
+        forward_kinematics(arm, zero)[:3, 3], [0.4521, -0.15005, 0.4318 + 0.67183], atol=1e-15
+    )
+    assert np.allclose(
+        forward_kinematics(arm, ready)[:3, 3], [0.0203, -0.15005, 0.8636 + 0.67183], atol=1e-15
+    )
 
 
 def test_the_pandas_published_ready_pose():

@@ -20,7 +20,17 @@ from random_arms import states
 
 ROUNDING = 1e-14  # of products of lengths up to 2 m
 ON_SURFACE = 1e-10  # of u^T (J J^T)^-1 u, which squares a condition number of up to some 100
-ARMS = ["puma560", "planar2r", "planar3r", "stanford", "cobra600", "panda", "cart_pendulum", "pan_tilt", "polar_rp"]
+ARMS = [
+    "puma560",
+    "planar2r",
+    "planar3r",
+    "stanford",
+    "cobra600",
+    "panda",
+    "cart_pendulum",
+    "pan_tilt",
+    "polar_rp",
+]
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -30,7 +40,9 @@ def test_it_is_the_product_of_as_many_singular_values_as_there_are_freedoms(name
     q = states(arm, 50)
     rank = freedoms(arm, motion)
     sigma = singular_values(arm, q, motion)
-    assert np.allclose(manipulability(arm, q, motion), np.prod(sigma[:, :rank], axis=1), rtol=0, atol=ROUNDING)
+    assert np.allclose(
+        manipulability(arm, q, motion), np.prod(sigma[:, :rank], axis=1), rtol=0, atol=ROUNDING
+    )
     assert sigma[:, rank:].max(initial=0.0) < ROUNDING
 
 
@@ -39,14 +51,18 @@ def test_that_of_a_planar_arm_is_published():
     arm = library_robot("planar2r")
     l1, l2 = arm.numbers.a
     q = states(arm, 100)
-    assert np.allclose(manipulability(arm, q), l1 * l2 * np.abs(np.sin(q[:, 1])), rtol=0, atol=ROUNDING)
+    assert np.allclose(
+        manipulability(arm, q), l1 * l2 * np.abs(np.sin(q[:, 1])), rtol=0, atol=ROUNDING
+    )
 
 
 def test_that_of_a_wrist_is_published():
     """A spherical wrist turns as well as the sine of its middle joint says (Yoshikawa 1985, section 5.4)."""
     wrist = from_dh([(0, 0, 0, "pi/2"), (0, 0, 0, "-pi/2"), (0, 0, 0, 0)])
     q = states(wrist, 50)
-    assert np.allclose(manipulability(wrist, q, "rotational"), np.abs(np.sin(q[:, 1])), rtol=0, atol=ROUNDING)
+    assert np.allclose(
+        manipulability(wrist, q, "rotational"), np.abs(np.sin(q[:, 1])), rtol=0, atol=ROUNDING
+    )
     assert freedoms(wrist) == 0
     assert np.array_equal(manipulability(wrist, q), np.zeros(50))
 
@@ -91,7 +107,9 @@ def test_the_ellipsoids_fit_the_jacobian(name, shape):
         assert np.all(np.diff(ellipsoid.lengths, axis=-1) <= 0)
         for u in np.random.default_rng(1).normal(size=(10, 3)):
             v = (ellipsoid.axes @ (ellipsoid.lengths * u / np.linalg.norm(u))[..., None])[..., 0]
-            assert np.allclose(np.einsum("...i,...ij,...j", v, inner, v), 1, rtol=0, atol=ON_SURFACE)
+            assert np.allclose(
+                np.einsum("...i,...ij,...j", v, inner, v), 1, rtol=0, atol=ON_SURFACE
+            )
     assert np.allclose(velocity.lengths, 1 / force.lengths[..., ::-1])
     assert np.allclose(velocity.lengths.prod(-1), manipulability(arm, q), rtol=0, atol=ROUNDING)
 
@@ -109,7 +127,9 @@ def test_an_arm_in_a_plane_has_a_flat_ellipsoid_and_holds_any_force_across():
     arm = library_robot("planar3r")
     q = states(arm, 4)
     assert np.array_equal(velocity_ellipsoid(arm, q).lengths[:, 2], np.zeros(4))
-    assert np.allclose(np.abs(velocity_ellipsoid(arm, q).axes[:, :, 2]), (0, 0, 1), rtol=0, atol=ROUNDING)
+    assert np.allclose(
+        np.abs(velocity_ellipsoid(arm, q).axes[:, :, 2]), (0, 0, 1), rtol=0, atol=ROUNDING
+    )
     assert np.array_equal(force_ellipsoid(arm, q).lengths[:, 0], np.full(4, np.inf))
 
 
@@ -139,7 +159,9 @@ def test_nan_in_gives_nan_out_of_that_row_and_no_other(motion):
         ellipsoid = velocity_ellipsoid(arm, broken, motion)
         for key, array in vars(ellipsoid).items():
             assert np.isnan(array[2]).all()
-            assert np.array_equal(array[rest], getattr(velocity_ellipsoid(arm, q, motion), key)[rest])
+            assert np.array_equal(
+                array[rest], getattr(velocity_ellipsoid(arm, q, motion), key)[rest]
+            )
 
 
 def test_batches_keep_their_shape_and_ellipsoids_travel():
@@ -150,15 +172,24 @@ def test_batches_keep_their_shape_and_ellipsoids_travel():
     assert np.ndim(manipulability(arm, q[0, 0])) == 0
     ellipsoid = velocity_ellipsoid(arm, q)
     back = pickle.loads(pickle.dumps(ellipsoid))
-    assert all(np.array_equal(a, b) for a, b in zip(vars(ellipsoid).values(), vars(back).values(), strict=True))
+    assert all(
+        np.array_equal(a, b)
+        for a, b in zip(vars(ellipsoid).values(), vars(back).values(), strict=True)
+    )
 
 
 @pytest.mark.parametrize(
     ("call", "complaint"),
     [
         (lambda arm: manipulability(arm, np.zeros(5)), r"q has shape \(5,\)"),
-        (lambda arm: manipulability(arm, np.zeros(6), "linear"), "motion is 'linear'; expected 'translational'"),
-        (lambda arm: velocity_ellipsoid(arm, np.zeros(6), "whole"), "motion is 'whole'; expected 'translational' or"),
+        (
+            lambda arm: manipulability(arm, np.zeros(6), "linear"),
+            "motion is 'linear'; expected 'translational'",
+        ),
+        (
+            lambda arm: velocity_ellipsoid(arm, np.zeros(6), "whole"),
+            "motion is 'whole'; expected 'translational' or",
+        ),
         (lambda arm: isotropy(arm, np.zeros((2, 7))), r"q has shape \(2, 7\)"),
     ],
 )

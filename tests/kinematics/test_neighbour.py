@@ -18,19 +18,32 @@ RIGHT = np.pi / 2
 
 def tilted_elbow(tilt):
     """Return a PUMA-like arm whose axes 2 and 3 are off parallel."""
-    rows = [(0, 0.3, 0, RIGHT), (0, 0, 0.4, tilt), (0, 0.1, 0.05, -RIGHT), (0, 0.4, 0, RIGHT), (0, 0, 0, -RIGHT)]
+    rows = [
+        (0, 0.3, 0, RIGHT),
+        (0, 0, 0.4, tilt),
+        (0, 0.1, 0.05, -RIGHT),
+        (0, 0.4, 0, RIGHT),
+        (0, 0, 0, -RIGHT),
+    ]
     return Arm.from_dh([*rows, (0, 0.1, 0, 0)], name="tilted_elbow")
 
 
 def scattered_wrist(tilt):
     """Return a PUMA-like arm whose axes 4, 5 and 6 do not quite meet, and are not quite perpendicular."""
     rows = [(0, 0.3, 0.1, RIGHT), (0, 0, 0.4, 0), (0, 0.1, 0.05, tilt - RIGHT), (0, 0.4, 0, RIGHT)]
-    return Arm.from_dh([*rows, (0, 0.4 * tilt, 0.3 * tilt, -RIGHT), (0, 0.1, 0, 0)], name="scattered_wrist")
+    return Arm.from_dh(
+        [*rows, (0, 0.4 * tilt, 0.3 * tilt, -RIGHT), (0, 0.1, 0, 0)], name="scattered_wrist"
+    )
 
 
 def calibrated_ur(tilt):
     """Return an arm like a UR5 after calibration, with every twist a little off."""
-    rows = [(0, 0.089, 0, RIGHT + tilt), (0, tilt, -0.425, tilt), (0, 0, -0.392, -tilt), (0, 0.109, 0, RIGHT)]
+    rows = [
+        (0, 0.089, 0, RIGHT + tilt),
+        (0, tilt, -0.425, tilt),
+        (0, 0, -0.392, -tilt),
+        (0, 0.109, 0, RIGHT),
+    ]
     return Arm.from_dh([*rows, (0, 0.0946, 0, tilt - RIGHT), (0, 0.08, 0, 0)], name="calibrated_ur")
 
 
@@ -103,11 +116,19 @@ def test_only_what_is_proved_is_out_of_reach():
     T[3, :3, 3] = 1e200
     T[4, 0, 0] = np.nan
     found = arm.ik(T)
-    assert found.status.tolist() == ["ok", "not_found", "out_of_reach", "out_of_reach", "not_a_pose"]
+    assert found.status.tolist() == [
+        "ok",
+        "not_found",
+        "out_of_reach",
+        "out_of_reach",
+        "not_a_pose",
+    ]
     assert np.array_equal(found.valid.any(axis=1), [True, False, False, False, False])
     assert found.distance[0] == 0
     assert np.isnan(found.distance[1:]).all()
-    with pytest.raises(UnreachableError, match="no solution was found, which does not prove that there is none"):
+    with pytest.raises(
+        UnreachableError, match="no solution was found, which does not prove that there is none"
+    ):
         arm.ik(T[1]).require()
 
 
@@ -138,7 +159,8 @@ def test_the_free_joint_of_the_neighbour_comes_from_the_seed():
 
 
 @pytest.mark.parametrize(
-    ("twist", "offset"), [(1e-15, 0), (1e-14, 0), (9e-13, 0), (0, 1e-15), (0, 1e-14), (0, 9e-13), (0, 0)]
+    ("twist", "offset"),
+    [(1e-15, 0), (1e-14, 0), (9e-13, 0), (0, 1e-15), (0, 1e-14), (0, 9e-13), (0, 0)],
 )
 def test_poses_at_the_boundary_of_an_arm_that_nearly_is_of_a_family_are_reached(law, twist, offset):
     """Stretched and folded: the family's member is 1e-6 of the reach too short for an arm that misses it by 1e-12."""
@@ -156,9 +178,15 @@ def test_poses_at_the_boundary_of_an_arm_that_nearly_is_of_a_family_are_reached(
     rng = np.random.default_rng(0)
     count = law.samples(300, quick=40)
     q = rng.uniform(-np.pi, np.pi, (count, 6))
-    q[:, 2] = rng.choice([-right, right], count) + np.arctan2(0.05, 0.4) + rng.choice([0, 1e-9, 1e-6], count)
+    q[:, 2] = (
+        rng.choice([-right, right], count)
+        + np.arctan2(0.05, 0.4)
+        + rng.choice([0, 1e-9, 1e-6], count)
+    )
     T = arm.fk(q)
     found = arm.ik(T)
     law.holds("poses that are not reached", int(np.sum(~found.valid.any(axis=1))), 0)
     back = arm.fk(np.where(found.valid[..., None], found.q, 0.0))
-    law.holds("closing", float(np.abs(back - T[:, None]).max(axis=(2, 3))[found.valid].max()), 1e-10)
+    law.holds(
+        "closing", float(np.abs(back - T[:, None]).max(axis=(2, 3))[found.valid].max()), 1e-10
+    )

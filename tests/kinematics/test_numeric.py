@@ -10,7 +10,13 @@ import acceptance
 from dhkit import Arm
 from dhkit.description import from_dh, library_robot, pose, robots, with_tool
 from dhkit.description.robot_file import from_toml
-from dhkit.kinematics import IKFlag, classify, forward_kinematics, inverse_kinematics, solve_numerically
+from dhkit.kinematics import (
+    IKFlag,
+    classify,
+    forward_kinematics,
+    inverse_kinematics,
+    solve_numerically,
+)
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.numeric import CHUNK
 from random_arms import states, tables
@@ -38,7 +44,9 @@ def gaps(arm, q, T):
 def moved(arm, q, before):
     """The largest change of a joint, angles the short way round, lengths over the reach."""
     prismatic = arm.numbers.prismatic
-    change = np.where(prismatic, (q - before) / arm.reach, (q - before + np.pi) % (2 * np.pi) - np.pi)
+    change = np.where(
+        prismatic, (q - before) / arm.reach, (q - before + np.pi) % (2 * np.pi) - np.pi
+    )
     return np.abs(change).max(axis=-1)
 
 
@@ -61,7 +69,11 @@ def test_poses_that_are_reached_are_found(name, law):
 def test_from_near_a_solution_all_poses_are_found(name, law):
     arm = library_robot(name)
     q, T = inside(arm, law.samples(4_000), seed=1)
-    away = NEAR * np.random.default_rng(2).uniform(-1, 1, q.shape) * np.where(arm.numbers.prismatic, arm.reach, 1.0)
+    away = (
+        NEAR
+        * np.random.default_rng(2).uniform(-1, 1, q.shape)
+        * np.where(arm.numbers.prismatic, arm.reach, 1.0)
+    )
     found = solve_numerically(arm, T, q + away)
     law.holds("share of poses missed", 1 - found.valid.mean(), 0.0)
     # Beside a singularity the next branch, or for a redundant arm all its curve of solutions, is near too.
@@ -153,7 +165,9 @@ def test_windings_inside_the_limits_are_kept():
     q = np.array([5.9, -1.2, 1.3, -4.0, 1.1, -6.0])
     found = solve_numerically(arm, forward_kinematics(arm, q), q + 0.05)
     assert found.q[0] == pytest.approx(q, abs=1e-9)
-    outside = solve_numerically(library_robot("puma560"), forward_kinematics(library_robot("puma560"), q * 0), q * 10)
+    outside = solve_numerically(
+        library_robot("puma560"), forward_kinematics(library_robot("puma560"), q * 0), q * 10
+    )
     assert outside.allowed.all()
 
 
@@ -165,7 +179,9 @@ def test_what_is_missing_is_how_far_the_position_is_out_of_reach(beyond):
     assert found.status == "out_of_reach"
     assert found.distance == pytest.approx(beyond, rel=1e-3)
     assert np.isnan(found.q).all()
-    assert solve_numerically(arm, pose((0.6 * arm.reach, -0.8 * arm.reach, 0)), position_only=True).valid.all()
+    assert solve_numerically(
+        arm, pose((0.6 * arm.reach, -0.8 * arm.reach, 0)), position_only=True
+    ).valid.all()
 
 
 def test_what_is_no_pose_is_said_and_disturbs_no_other():
@@ -209,7 +225,9 @@ def test_equal_seeds_give_equal_results_and_other_starts_other_solutions():
     assert np.array_equal(solve_numerically(arm, T, seed=3).q, solve_numerically(arm, T, seed=3).q)
     assert not np.array_equal(solve_numerically(arm, T).q, solve_numerically(arm, T, q).q)
     q[3] = np.nan  # starts from the middle of the limits, like a pose without a start
-    assert np.allclose(solve_numerically(arm, T, q).q[3], solve_numerically(arm, T[3]).q, rtol=0, atol=1e-9)
+    assert np.allclose(
+        solve_numerically(arm, T, q).q[3], solve_numerically(arm, T[3]).q, rtol=0, atol=1e-9
+    )
 
 
 def test_restarts_find_more():
@@ -242,7 +260,9 @@ def test_threads_change_nothing():
 
 
 def test_an_arm_without_an_exact_closed_form_and_with_a_tool():
-    arm = with_tool(from_dh([(0, 0.2, 0.1, 0.3 * k) for k in range(7)], kinds="RRPRRRR"), pose((0.1, 0.2, 0.3)))
+    arm = with_tool(
+        from_dh([(0, 0.2, 0.1, 0.3 * k) for k in range(7)], kinds="RRPRRRR"), pose((0.1, 0.2, 0.3))
+    )
     assert classify(arm).family is None
     q = states(arm, 20)
     T = forward_kinematics(arm, q)
@@ -284,7 +304,11 @@ def test_the_error_of_a_rotation_is_its_rotation_vector(angle):
         ({"T": np.eye(3)}, ValueError, r"T has shape \(3, 3\); expected \(\.\.\., 4, 4\)"),
         ({"T": "pose"}, TypeError, "expected numbers"),
         ({"q0": np.zeros(5)}, ValueError, r"q0 has shape \(5,\); expected \(\.\.\., 6\)"),
-        ({"q0": np.zeros((3, 6))}, ValueError, r"q0 has shape \(3, 6\); expected \(6,\) or \(2, 6\)"),
+        (
+            {"q0": np.zeros((3, 6))},
+            ValueError,
+            r"q0 has shape \(3, 6\); expected \(6,\) or \(2, 6\)",
+        ),
         ({"restarts": -1}, ValueError, "restarts is -1; expected a whole number, 0 or more"),
         ({"tolerance": 0.0}, ValueError, "tolerance is 0.0; expected a positive number"),
         ({"tolerance": np.nan}, ValueError, "tolerance is nan"),

@@ -105,7 +105,9 @@ def test_a_limit_in_the_way_makes_the_arm_switch_and_that_is_said():
 def test_any_arm_with_a_closed_form_follows(name):
     arm = Arm.load(name)
     numbers = arm.description.numbers
-    middle = np.where(np.isfinite(numbers.lower + numbers.upper), (numbers.lower + numbers.upper) / 2, 0.0)
+    middle = np.where(
+        np.isfinite(numbers.lower + numbers.upper), (numbers.lower + numbers.upper) / 2, 0.0
+    )
     q0 = middle + np.where(numbers.prismatic, 0.0, 0.2)
     q = q0 + np.linspace(0, 0.3, 50)[:, None] * np.where(numbers.prismatic, 0.1, 1.0)
     path = arm.ik_path(arm.fk(q), q0, limits=False)

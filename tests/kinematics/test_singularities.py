@@ -14,7 +14,12 @@ from dhkit.errors import ModelError
 from dhkit.expressions import exact
 from dhkit.kinematics import IKFlag, classify, forward_kinematics, inverse_kinematics, jacobian
 from dhkit.kinematics.manipulability import freedoms, manipulability
-from dhkit.kinematics.singularities import determinant, measures, singular_configurations, singularities
+from dhkit.kinematics.singularities import (
+    determinant,
+    measures,
+    singular_configurations,
+    singularities,
+)
 from dhkit.model import pinocchio_model
 from dhkit.verification import random_states
 from random_arms import elbow_arms, few_joint_arms, slide_arms, states, three_parallel_arms
@@ -63,7 +68,9 @@ def test_pinocchio_has_that_determinant(name):
 def test_any_arm_of_the_families(law, arm):
     law.samples(1000)
     family = classify(arm).family
-    assume(family is not None and family.name not in ("pan_tilt", "slider"))  # links that cancel have none
+    assume(
+        family is not None and family.name not in ("pan_tilt", "slider")
+    )  # links that cancel have none
     q = states(arm, 20)
     J = controlled(arm, q)
     error = np.abs(np.abs(np.linalg.det(J)) - determinant(arm, q)) / size(arm, J)
@@ -71,8 +78,12 @@ def test_any_arm_of_the_families(law, arm):
     for kind, text in singularities(arm).words.items():
         if text.startswith("never"):
             continue
-        sigma = np.linalg.svd(controlled(arm, singular_configurations(arm, kind, 5)), compute_uv=False)
-        law.holds(f"{kind} of a random arm", (sigma[:, -1] / sigma[:, 0]).max(), SINGULAR, arm.joints)
+        sigma = np.linalg.svd(
+            controlled(arm, singular_configurations(arm, kind, 5)), compute_uv=False
+        )
+        law.holds(
+            f"{kind} of a random arm", (sigma[:, -1] / sigma[:, 0]).max(), SINGULAR, arm.joints
+        )
 
 
 @pytest.mark.parametrize(("name", "kind"), EACH)
@@ -114,7 +125,9 @@ def test_puma_words_are_those_of_the_textbook():
 def test_the_elbow_of_corkes_puma_knows_its_offsets():
     """Elbow and wrist are stretched where a forearm of d4 with an offset a3 lies along the upper arm."""
     found = singularities(library_robot("puma560"))
-    assert found.values["elbow"] == pytest.approx((np.arctan2(-0.4318, 0.0203), np.arctan2(0.4318, -0.0203)), abs=1e-15)
+    assert found.values["elbow"] == pytest.approx(
+        (np.arctan2(-0.4318, 0.0203), np.arctan2(0.4318, -0.0203)), abs=1e-15
+    )
     assert found.values["wrist"] == pytest.approx((0, np.pi), abs=1e-15)
     assert found.joints == {"shoulder": None, "elbow": 2, "wrist": 4}
 
@@ -127,7 +140,12 @@ def test_the_shoulders_equation_is_the_arms(name):
     if words is None:
         return
     equation = words.split(": ")[1].removesuffix(" = 0")
-    for old, new in (("cos q2", "cos(q2)"), ("sin q2", "sin(q2)"), (" cos", "*cos"), (" sin", "*sin")):
+    for old, new in (
+        ("cos q2", "cos(q2)"),
+        ("sin q2", "sin(q2)"),
+        (" cos", "*cos"),
+        (" sin", "*sin"),
+    ):
         equation = equation.replace(old, new)
     for sign in "+-":
         equation = equation.replace(f"{sign}*", f"{sign} ")
@@ -188,7 +206,9 @@ def test_what_is_not_known_is_said():
     for name in UNKNOWN:
         with pytest.raises(ModelError, match="singular_values find them numerically"):
             singularities(library_robot(name))
-    with pytest.raises(ValueError, match="kind is 'knee'; puma560 has 'shoulder', 'elbow', 'wrist'"):
+    with pytest.raises(
+        ValueError, match="kind is 'knee'; puma560 has 'shoulder', 'elbow', 'wrist'"
+    ):
         singular_configurations(library_robot("puma560"), "knee", 1)
     with pytest.raises(ValueError, match=r"q has shape \(5,\)"):
         measures(library_robot("puma560"), np.zeros(5))
@@ -206,5 +226,9 @@ def test_the_workspace_command_says_where(capsys, tmp_path):
             assert all(f"{kind}: {words}" in out for kind, words in found.words.items())
             continue
         told = json.loads(out)["singularities"]
-        assert told["elbow"] == {"joint": 3, "values_rad": list(found.values["elbow"]), "words": found.words["elbow"]}
+        assert told["elbow"] == {
+            "joint": 3,
+            "values_rad": list(found.values["elbow"]),
+            "words": found.words["elbow"],
+        }
         assert told["shoulder"]["joint"] is None

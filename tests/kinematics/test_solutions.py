@@ -26,7 +26,10 @@ def elbow_points(arm, q):
     z, p, origins = axes_of(arm, q)
     end = p[:, 3] if arm.name in FAMILY_B else origins[:, 4]
     foot = p[:, 1]
-    return [x - np.sum((x - foot) * z[:, 1], axis=-1, keepdims=True) * z[:, 1] for x in (foot, p[:, 2], end)]
+    return [
+        x - np.sum((x - foot) * z[:, 1], axis=-1, keepdims=True) * z[:, 1]
+        for x in (foot, p[:, 2], end)
+    ]
 
 
 @pytest.mark.parametrize("name", ELBOWS)
@@ -60,13 +63,17 @@ def test_left_is_the_branch_whose_arm_passes_axis_1_on_the_left(name):
         q = solutions.q[solutions.valid[:, i], i]
         z, p, origins = axes_of(arm, q)
         wrist = origins[:, 5] if name in FAMILY_B else origins[:, 4]
-        across = np.sum((wrist - p[:, 0]) * z[:, 1], axis=1, keepdims=True) * z[:, 1]  # axis 1 to the arm's plane
+        across = (
+            np.sum((wrist - p[:, 0]) * z[:, 1], axis=1, keepdims=True) * z[:, 1]
+        )  # axis 1 to the arm's plane
         sight = (wrist - p[:, 0])[:, :2]
         side = sight[:, 0] * across[:, 1] - sight[:, 1] * across[:, 0]
         assert ((side > -1e-9) if label.startswith("left") else (side < 1e-9)).all()
 
 
-@pytest.mark.parametrize("name", [name for name in FAMILY_A if name not in ("puma560", "puma560_akb", "puma560_cao")])
+@pytest.mark.parametrize(
+    "name", [name for name in FAMILY_A if name not in ("puma560", "puma560_akb", "puma560_cao")]
+)
 def test_front_is_the_branch_that_faces_the_wrist(name):
     arm, _, solutions = solved(name)
     assert {label.split()[0] for label in solutions.branches} == {"front", "back"}
@@ -115,8 +122,16 @@ def test_status_says_what_became_of_a_pose():
     T[7] = forward_kinematics(arm, [0.3, 0.4, -1.0, 0.5, 0.0, 0.7])
     T[8] = 0.0
     solutions = inverse_kinematics(arm, T)
-    assert solutions.status.tolist() == ["ok", "out_of_reach", *["not_a_pose"] * 5, "singular", "not_a_pose"]
-    assert np.array_equal(solutions.status_code == IKStatus.not_a_pose, np.isnan(solutions.distance))
+    assert solutions.status.tolist() == [
+        "ok",
+        "out_of_reach",
+        *["not_a_pose"] * 5,
+        "singular",
+        "not_a_pose",
+    ]
+    assert np.array_equal(
+        solutions.status_code == IKStatus.not_a_pose, np.isnan(solutions.distance)
+    )
     assert (solutions.distance[[0, 7]] == 0).all()
     # The nearest of the points that the wrist's centre reaches, by brute force over the stretched arm.
     lean = np.linspace(-np.pi, np.pi, 100_001)
@@ -147,7 +162,9 @@ def test_distance_shrinks_to_zero_at_the_boundary():
 
 def test_on_the_boundary_both_elbows_are_one_and_clamped():
     arm = library_robot("puma560")
-    q = np.array([0.3, 0.4, np.arctan2(-0.4318, 0.0203), 0.5, 0.6, 0.7])  # axis 3 to wrist in line with the upper arm
+    q = np.array(
+        [0.3, 0.4, np.arctan2(-0.4318, 0.0203), 0.5, 0.6, 0.7]
+    )  # axis 3 to wrist in line with the upper arm
     found = 0
     for shift in np.linspace(-2e-8, 2e-8, 201):
         T = forward_kinematics(arm, q + shift * np.eye(6)[2])
@@ -174,7 +191,9 @@ def test_windings_and_limits():
     assert np.abs(closest - q).max() < 1e-12
     assert np.abs(solutions.require(near=q) - q).max() < 1e-12
     # The last joint goes from -266 to 266 degrees: -260 is 100 as well.
-    name = solutions.branches[int(np.nanargmin(np.abs(solutions.within_limits(q) - q).max(axis=-1)))]
+    name = solutions.branches[
+        int(np.nanargmin(np.abs(solutions.within_limits(q) - q).max(axis=-1)))
+    ]
     windings = np.array(solutions.windings(name))
     assert len(np.unique(windings.round(9), axis=0)) == len(windings) == 2
     assert np.abs(arm.fk(windings) - arm.fk(q)).max() < 1e-14
@@ -186,7 +205,11 @@ def test_the_out_of_limits_flag_is_that_of_every_winding():
     lower, upper = arm.numbers.lower, arm.numbers.upper
     turns = 2 * np.pi * np.arange(-3, 4)[:, None, None, None]
     with np.errstate(invalid="ignore"):
-        inside = ((solutions.q + turns >= lower) & (solutions.q + turns <= upper)).any(axis=0).all(axis=-1)
+        inside = (
+            ((solutions.q + turns >= lower) & (solutions.q + turns <= upper))
+            .any(axis=0)
+            .all(axis=-1)
+        )
     flagged = solutions.flags & IKFlag.out_of_limits > 0
     assert np.array_equal(solutions.valid & ~flagged, inside)
 

@@ -24,7 +24,9 @@ def planar(l1, l2):
 def test_points_lie_inside_the_reach_and_the_limits(name):
     arm = library_robot(name)
     space = workspace(arm, FEW)
-    offsets = np.linalg.norm([arm.numbers.T_world_base[:3, 3], arm.numbers.T_last_tool[:3, 3]], axis=1).sum()
+    offsets = np.linalg.norm(
+        [arm.numbers.T_world_base[:3, 3], arm.numbers.T_last_tool[:3, 3]], axis=1
+    ).sum()
     assert np.linalg.norm(space.positions, axis=1).max() <= arm.reach + offsets + ROUNDING
     assert space.distances[0] <= space.distances[1] <= arm.reach + offsets + ROUNDING
     assert space.radii[1] <= space.distances[1] + ROUNDING
@@ -32,7 +34,9 @@ def test_points_lie_inside_the_reach_and_the_limits(name):
     assert np.array_equal(space.lower[limited], arm.numbers.lower[limited])
     assert np.array_equal(space.upper[limited], arm.numbers.upper[limited])
     assert np.all((space.best >= space.lower) & (space.best <= space.upper))
-    assert space.manipulability.max() == pytest.approx(float(manipulability(arm, space.best)), rel=1e-12)
+    assert space.manipulability.max() == pytest.approx(
+        float(manipulability(arm, space.best)), rel=1e-12
+    )
     assert space.grid.counts.sum() == space.samples == FEW
 
 
@@ -47,10 +51,14 @@ def test_the_area_of_a_planar_arm_is_a_ring(lengths, tilted):
     ring = np.pi * ((l1 + l2) ** 2 - (l1 - l2) ** 2)
     assert space.estimate.dimension == 2
     assert abs(space.estimate.value - ring) < space.estimate.margin
-    assert space.estimate.value == pytest.approx(ring, rel=0.02)  # 20 samples a cell leave few holes
+    assert space.estimate.value == pytest.approx(
+        ring, rel=0.02
+    )  # 20 samples a cell leave few holes
     assert "m²" in str(space.estimate)
     base = arm.numbers.T_world_base[:3, 3]
-    assert np.allclose(np.linalg.norm(space.positions - base, axis=1).max(), space.distances[1], atol=ROUNDING)
+    assert np.allclose(
+        np.linalg.norm(space.positions - base, axis=1).max(), space.distances[1], atol=ROUNDING
+    )
     assert space.distances == pytest.approx((abs(l1 - l2), l1 + l2), abs=RARE)
 
 
@@ -123,7 +131,11 @@ def test_an_unlimited_slider_is_given_the_reach():
 
 def test_a_seed_gives_the_same_and_another_something_else():
     arm = library_robot("puma560")
-    one, again, other = workspace(arm, FEW, 5), workspace(arm, FEW, 5, threads=2), workspace(arm, FEW, 6)
+    one, again, other = (
+        workspace(arm, FEW, 5),
+        workspace(arm, FEW, 5, threads=2),
+        workspace(arm, FEW, 6),
+    )
     for key in ("positions", "manipulability", "best"):
         assert np.array_equal(getattr(one, key), getattr(again, key))
         assert not np.array_equal(getattr(one, key), getattr(other, key))
@@ -139,22 +151,31 @@ def test_fewer_samples_are_the_first_of_more_whatever_the_chunks():
     # The last chunk is worked on like the first.
     rng = np.random.default_rng(0)
     q = many.lower + (many.upper - many.lower) * rng.random((CHUNK + 100, 2))
-    assert np.allclose(many.positions[-100:], forward_kinematics(arm, q[-100:])[:, :3, 3], rtol=0, atol=ROUNDING)
+    assert np.allclose(
+        many.positions[-100:], forward_kinematics(arm, q[-100:])[:, :3, 3], rtol=0, atol=ROUNDING
+    )
 
 
 def test_radii_are_measured_from_the_first_axis_in_either_convention():
     """An arm written twice: what the modified table puts before the first joint is the standard one's base."""
     modified = from_dh(
-        [("pi/2", 0.2, 0, 0), (0, 0.5, 0.1, 0)], order=("alpha", "a", "d", "theta"), convention="modified"
+        [("pi/2", 0.2, 0, 0), (0, 0.5, 0.1, 0)],
+        order=("alpha", "a", "d", "theta"),
+        convention="modified",
     )
-    standard = with_base(from_dh([(0, 0, 0.5, 0), (0, 0.1, 0, 0)]), pose((0.2, 0, 0), euler=(np.pi / 2, 0, 0)))
+    standard = with_base(
+        from_dh([(0, 0, 0.5, 0), (0, 0.1, 0, 0)]), pose((0.2, 0, 0), euler=(np.pi / 2, 0, 0))
+    )
     assert workspace(modified, FEW).radii == pytest.approx((0.5, 0.5), abs=ROUNDING)
     assert workspace(standard, FEW).radii == pytest.approx((0.5, 0.5), abs=ROUNDING)
 
 
 def test_a_grid_finds_its_points_again():
     rng = np.random.default_rng(0)
-    for points in (rng.normal(size=(500, 3)), rng.normal(size=(500, 2)) @ rng.normal(size=(2, 3)) + 1):
+    for points in (
+        rng.normal(size=(500, 3)),
+        rng.normal(size=(500, 2)) @ rng.normal(size=(2, 3)) + 1,
+    ):
         grid = occupancy(points, 0.2, 1e-9)
         cells = np.floor((points - grid.origin) @ grid.axes.T / grid.edge + 1e-9).astype(int)
         counts = np.zeros_like(grid.counts)

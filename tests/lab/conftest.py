@@ -8,7 +8,9 @@ from dhkit import Arm
 from dhkit.lab import Assignment, Lab
 from lab.test_requests import states
 
-COMPLETE = "globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints"
+COMPLETE = (
+    "globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints"
+)
 """Whether a page has been told everything, as JavaScript."""
 
 
@@ -51,7 +53,11 @@ def check_errors_and_requests(page, url):
     """Check that a page has met no error, which it forgets, and made no request to anyone else."""
     errors, page.errors = page.errors, []
     assert errors == []
-    hosts = {address.split("/")[2] for address in page.requests if not address.startswith(("data:", "blob:"))}
+    hosts = {
+        address.split("/")[2]
+        for address in page.requests
+        if not address.startswith(("data:", "blob:"))
+    }
     assert hosts == {url.removeprefix("http://").split("/")[0]}
 
 

@@ -6,7 +6,10 @@ import json
 def panel(page, name):
     """Open a panel."""
     # A click on the panel that is open hides it.
-    if page.evaluate(f"document.getElementById('tab-{name}').getAttribute('aria-selected')") != "true":
+    if (
+        page.evaluate(f"document.getElementById('tab-{name}').getAttribute('aria-selected')")
+        != "true"
+    ):
         page.click(f"document.getElementById('tab-{name}')")
     assert page.evaluate(f"document.getElementById('panel-{name}').hidden") is False
 

@@ -106,9 +106,16 @@ def test_the_two_shoulders_of_the_puma_reach_one_pose():
 
 def test_the_documents_format_is_one(read):
     text = (ROOT / "docs" / "lab.md").read_text("utf-8")
-    shown = next(block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "kind" in block)
+    shown = next(
+        block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "kind" in block
+    )
     assignment = read(shown)
-    assert [type(goal.condition) for goal in goals(assignment)] == [ToolAt, JointsAt, MotionBetween, OwnScore]
+    assert [type(goal.condition) for goal in goals(assignment)] == [
+        ToolAt,
+        JointsAt,
+        MotionBetween,
+        OwnScore,
+    ]
     SCHEMA.validate(tomllib.loads(shown))
 
 
@@ -134,7 +141,10 @@ def test_a_bad_file_is_refused_in_one_line(name, read, tmp_path, monkeypatch):
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    for path, complaint in ((tmp_path / "none.toml", "no such file"), (tmp_path, "not a regular file")):
+    for path, complaint in (
+        (tmp_path / "none.toml", "no such file"),
+        (tmp_path, "not a regular file"),
+    ):
         with pytest.raises(DescriptionError, match=complaint):
             Assignment.read(path)
 
@@ -157,7 +167,10 @@ def test_a_robot_file_beside_it_is_read_and_a_link_that_leads_away_is_not(read, 
 def test_a_pose_that_a_six_axis_arm_cannot_take_is_refused(read):
     # In reach, but only with joint values beyond the limits; and beyond the wrist's sphere.
     head = HEAD.replace("planar2r", "puma560_cao") + STEP
-    for xyz, complaint in (("[-0.6, 0, 0.4]", "outside the joint limits"), ("[0.05, 0, 0]", "out of reach")):
+    for xyz, complaint in (
+        ("[-0.6, 0, 0.4]", "outside the joint limits"),
+        ("[0.05, 0, 0]", "out of reach"),
+    ):
         goal = POSE.replace("[0.5, 0.4, 0.0]", f'{xyz}, euler = ["pi", 0.3, 0]')
         with pytest.raises(DescriptionError, match=f"step 1: goal 1: pose: .*{complaint}"):
             read(head + goal)
@@ -174,7 +187,11 @@ def test_what_is_an_assignment(tmp_path):
         (tmp_path / f"{name}.toml").write_text(text)
     found = {name for name in files if is_assignment(tmp_path / f"{name}.toml")}
     assert found == {"task", "broken"}
-    assert not is_assignment("puma560") and not is_assignment(tmp_path / "none.toml") and not is_assignment(tmp_path)
+    assert (
+        not is_assignment("puma560")
+        and not is_assignment(tmp_path / "none.toml")
+        and not is_assignment(tmp_path)
+    )
 
 
 # Goals
@@ -184,7 +201,12 @@ def test_goals_are_met_by_what_is_done_in_the_panels_and_stay_met(begin, read):
     lab = begin(read(GOOD))
     assert np.array_equal(lab.desk.q, lab.desk.arm.configurations["ready"])
     task = states(lab)["task"]
-    assert (task["title"], task["panels"], task["points"], task["most"]) == ("T", ["joints", "motion"], 0, 5)
+    assert (task["title"], task["panels"], task["points"], task["most"]) == (
+        "T",
+        ["joints", "motion"],
+        0,
+        5,
+    )
     assert "--mine FILE" in task["note"]
     lab.answer("joints.set", {"q": [np.pi / 2 + 0.009, -0.009]})
     assert met(lab) == [True, False, False, False] and states(lab)["task"]["points"] == 1
@@ -210,7 +232,12 @@ def test_goals_are_met_by_what_is_done_in_the_panels_and_stay_met(begin, read):
 
 @pytest.mark.parametrize(
     ("q", "there"),
-    [([0, np.pi / 2], True), ([0.01, np.pi / 2], False), ([0, np.pi / 2 + 0.01], False), ([0, -np.pi / 2], False)],
+    [
+        ([0, np.pi / 2], True),
+        ([0.01, np.pi / 2], False),
+        ([0, np.pi / 2 + 0.01], False),
+        ([0, -np.pi / 2], False),
+    ],
 )
 def test_a_position_has_its_tolerance(begin, read, q, there):
     lab = begin(read(HEAD + STEP + POSE.replace("points = 2", "tolerance = { position = 0.001 }")))
@@ -218,7 +245,9 @@ def test_a_position_has_its_tolerance(begin, read, q, there):
     assert met(lab) == [there]
 
 
-@pytest.mark.parametrize(("angle", "there"), [(0.0, True), (0.019, True), (0.021, False), (3.0, False)])
+@pytest.mark.parametrize(
+    ("angle", "there"), [(0.0, True), (0.019, True), (0.021, False), (3.0, False)]
+)
 def test_a_rotation_has_its_tolerance(angle, there):
     T, turned = np.eye(4), np.eye(4)
     turned[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
@@ -252,7 +281,9 @@ def test_an_edited_table_does_not_count(begin, read):
 
 def test_assumed_masses_change_nothing(begin, read, tmp_path):
     write_robot(Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)]).description, tmp_path / "bare.toml")
-    lab = begin(read(HEAD.replace("planar2r", "bare.toml").replace("ready", "zero") + STEP + JOINTS))
+    lab = begin(
+        read(HEAD.replace("planar2r", "bare.toml").replace("ready", "zero") + STEP + JOINTS)
+    )
     lab.answer("bodies.assume", {})
     assert states(lab)["arm"]["assumed_bodies"] and states(lab)["task"]["note"] is None
     lab.answer("joints.set", {"q": [np.pi / 2, 0.0]})
@@ -270,7 +301,9 @@ def test_a_controller_that_moves_the_arm_there_counts(begin, read):
 @pytest.mark.slow
 def test_the_share_of_a_score(begin, read, tmp_path):
     program = tmp_path / "mine.py"
-    program.write_text("def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n")
+    program.write_text(
+        "def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+    )
     lab = begin(read(HEAD + STEP + SCORE), own=program, isolation=UNPROTECTED)
     wait_for(lambda: states(lab)["own"].get("report"))
     assert met(lab) == [False] and states(lab)["task"]["note"] is None
@@ -278,9 +311,9 @@ def test_the_share_of_a_score(begin, read, tmp_path):
     wait_for(lambda: met(lab) == [True])
     report = states(lab)["own"]["report"]
     assert OwnScore("fk", 1.0).is_reached(report)
-    assert not OwnScore("controller", 0.1).is_reached(report) and not OwnScore("fk", 0.1).is_reached(
-        {"error": "it died"}
-    )
+    assert not OwnScore("controller", 0.1).is_reached(report) and not OwnScore(
+        "fk", 0.1
+    ).is_reached({"error": "it died"})
 
 
 def test_a_lab_without_one_and_a_lab_of_another_robot(open_lab, read, tmp_path):
@@ -290,7 +323,9 @@ def test_a_lab_without_one_and_a_lab_of_another_robot(open_lab, read, tmp_path):
         lab.answer("task.reset", {})
     with pytest.raises(DescriptionError, match="found puma560; expected planar2r"):
         Lab(Arm.load("puma560"), assignment=read(GOOD))
-    with serve(Arm.load("planar2r"), assignment=tmp_path / "task.toml", block=False, open_browser=False) as lab:
+    with serve(
+        Arm.load("planar2r"), assignment=tmp_path / "task.toml", block=False, open_browser=False
+    ) as lab:
         assert states(lab)["task"]["title"] == "T"
 
 
@@ -325,7 +360,10 @@ def test_the_command_opens_it_and_prints_the_schema(tmp_path, monkeypatch, capsy
     bad = tmp_path / "bad.toml"
     bad.write_text(GOOD.replace("points", "point"))
     code, _, error = run(["lab", str(bad)], monkeypatch, capsys)
-    assert code == 2 and error == f"dhkit: {bad}: step 1: goal 2: unknown key 'point'; did you mean 'points'?\n"
+    assert (
+        code == 2
+        and error == f"dhkit: {bad}: step 1: goal 2: unknown key 'point'; did you mean 'points'?\n"
+    )
     code, out, _ = run(["schema", "assignment"], monkeypatch, capsys)
     schema = json.loads(out)
     printed = jsonschema.Draft202012Validator(schema)

@@ -54,9 +54,20 @@ def sheets(tmp_path):
 
 def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
     lab, page = visit(Assignment.read(EXAMPLES[1]))
-    assert page.evaluate(TABS) == ["task", "joints", "tool", "motion", "table", "control", "transforms"]
+    assert page.evaluate(TABS) == [
+        "task",
+        "joints",
+        "tool",
+        "motion",
+        "table",
+        "control",
+        "transforms",
+    ]
     assert page.evaluate("document.getElementById('panel-task').hidden") is False
-    assert page.evaluate("document.querySelector('#panel-task h2').textContent") == "The PUMA simulator in four steps"
+    assert (
+        page.evaluate("document.querySelector('#panel-task h2').textContent")
+        == "The PUMA simulator in four steps"
+    )
     assert page.evaluate("[...document.querySelectorAll('.tasks details')].map(d => d.open)") == [
         True,
         False,
@@ -80,7 +91,10 @@ def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
     page.click("document.getElementById('tab-task')")
     assert page.evaluate(WORDS)[0] == ["done", "open"]
     assert page.evaluate("document.querySelector('.goals .met .sign').textContent") == "✓"
-    assert page.evaluate("document.querySelector('#panel-task .facts').textContent") == "1 of 15 points, 1 of 11 goals"
+    assert (
+        page.evaluate("document.querySelector('#panel-task .facts').textContent")
+        == "1 of 15 points, 1 of 11 goals"
+    )
     for scheme in ("light", "dark"):
         page.scheme(scheme)
         page.settle()
@@ -91,13 +105,17 @@ def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
     assert page.evaluate("document.getElementById('panel-motion').hidden") is False
     assert page.evaluate(WORDS)[0] == ["done", "open"]
     page.click("document.getElementById('tab-task')")
-    page.click("[...document.querySelectorAll('#panel-task button')].find(b => b.textContent === 'Reset')")
+    page.click(
+        "[...document.querySelectorAll('#panel-task button')].find(b => b.textContent === 'Reset')"
+    )
     page.until(f"({WORDS})[0][0] === 'open'")
     assert met(lab) == [False] * 11
 
 
 def test_texts_are_texts_and_the_order_of_states_does_not_matter(visit, read, open_lab):
-    hostile = GOOD.replace('"some words"', json.dumps(f"{HOSTILE}\n\nb & c")).replace('"T"', json.dumps(HOSTILE))
+    hostile = GOOD.replace('"some words"', json.dumps(f"{HOSTILE}\n\nb & c")).replace(
+        '"T"', json.dumps(HOSTILE)
+    )
     hostile = hostile.replace('"one"', json.dumps(HOSTILE)).replace('"a"', json.dumps(HOSTILE))
     _, page = visit(read(hostile))
     texts = "[...document.querySelectorAll('.tasks p')].map(p => p.textContent)"
@@ -105,7 +123,9 @@ def test_texts_are_texts_and_the_order_of_states_does_not_matter(visit, read, op
     for place in ("#panel-task h2", ".goals li span:nth-child(2)"):
         assert page.evaluate(f"document.querySelector({json.dumps(place)}).textContent") == HOSTILE
     page.images_have_failed()
-    assert page.evaluate("[document.querySelectorAll('img').length, globalThis.hacked ?? null]") == [0, None]
+    assert page.evaluate(
+        "[document.querySelectorAll('img').length, globalThis.hacked ?? null]"
+    ) == [0, None]
     told = (
         "(names => { const { task } = dhkit.lab.state, own = { file: 'mine.py', functions: [] };"
         " for (const name of names) dhkit.lab.take({ name, data: { task, own }[name] }); })"
@@ -113,7 +133,9 @@ def test_texts_are_texts_and_the_order_of_states_does_not_matter(visit, read, op
     for names in (["task", "own"], ["own", "task"]):
         page.evaluate(f"{told}({names})")
         assert page.evaluate(TABS) == ["task", "joints", "motion"]
-    page.evaluate("dhkit.lab.take({ name: 'task', data: { ...dhkit.lab.state.task, panels: null } })")
+    page.evaluate(
+        "dhkit.lab.take({ name: 'task', data: { ...dhkit.lab.state.task, panels: null } })"
+    )
     assert page.evaluate(TABS) == ["task", *PANELS]
     page.evaluate("dhkit.lab.take({ name: 'task', data: null })")
     assert page.evaluate(TABS) == [*PANELS]

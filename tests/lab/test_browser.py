@@ -90,7 +90,9 @@ def test_a_number_is_typed_and_a_wrong_one_is_refused(kept_page):
     assert page.evaluate(f"{labelled('waist, value')}.value") == "-33.125"
     write(page, "waist, value", "many")
     page.until("!document.querySelector('#lab .message').hidden")
-    assert "expected a number" in page.evaluate("document.querySelector('#lab .message').textContent")
+    assert "expected a number" in page.evaluate(
+        "document.querySelector('#lab .message').textContent"
+    )
     assert page.evaluate(f"{labelled('waist, value')}.value") == "-33.125"
     write(page, "waist, value", "170")
     page.until("document.querySelector('.joint').classList.contains('outside')")
@@ -116,7 +118,9 @@ def unit(name):
 def test_units_change_what_is_shown_and_not_the_arm(visit):
     lab, page = visit("stanford")
     before = lab.desk.q.copy()
-    slide = next(i for i, joint in enumerate(lab.desk.arm.description.joints) if not joint.is_revolute)
+    slide = next(
+        i for i, joint in enumerate(lab.desk.arm.description.joints) if not joint.is_revolute
+    )
     field = f"document.querySelectorAll('.joint .number')[{slide}]"
     page.click(unit("mm"))
     assert page.evaluate(f"{field}.value") == f"{1000 * before[slide]:.1f}"
@@ -175,10 +179,20 @@ def handle(page, lab, turns):
     for axis in range(3):
         u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
         for angle in np.linspace(0, 2 * math.pi, 24, endpoint=False) if turns else [0.0]:
-            local = RING * (math.cos(angle) * u + math.sin(angle) * v) if turns else ARROW * np.eye(3)[axis]
-            way = RING * (math.cos(angle) * v - math.sin(angle) * u) if turns else np.eye(3)[axis] / (LENGTH * reach)
+            local = (
+                RING * (math.cos(angle) * u + math.sin(angle) * v)
+                if turns
+                else ARROW * np.eye(3)[axis]
+            )
+            way = (
+                RING * (math.cos(angle) * v - math.sin(angle) * u)
+                if turns
+                else np.eye(3)[axis] / (LENGTH * reach)
+            )
             place, moved = (
-                np.array(in_scene(page, T[:3, :3] @ (LENGTH * reach * (local + step * way)) + T[:3, 3]))
+                np.array(
+                    in_scene(page, T[:3, :3] @ (LENGTH * reach * (local + step * way)) + T[:3, 3])
+                )
                 for step in (0.0, 1e-3)
             )
             found.append((float(np.linalg.norm(moved - place)), place, axis, moved - place))
@@ -255,7 +269,12 @@ def test_a_dragged_target_is_followed_at_twenty_updates_a_second(visit, slack, t
     assert page.evaluate("cameras.size") == 1
     q = lab.desk.q.copy()
     page.settle()
-    xyz = [float(text) for text in page.evaluate("[...document.querySelectorAll('.pose .number')].map(i => i.value)")]
+    xyz = [
+        float(text)
+        for text in page.evaluate(
+            "[...document.querySelectorAll('.pose .number')].map(i => i.value)"
+        )
+    ]
     assert np.abs(np.array(xyz[:3]) - lab.desk.arm.fk(q)[:3, 3]).max() < PRINTED
 
 
@@ -265,7 +284,9 @@ def test_eight_branches_are_counted_on_screen_and_one_is_chosen(kept_page):
     take_target(page, lab)
     rows = "[...document.querySelectorAll('.branches button')].filter(b => b.getBoundingClientRect().height > 0)"
     page.until(f"{rows}.length === 8")
-    assert page.evaluate(f"{rows}.filter(b => b.getAttribute('aria-pressed') === 'true').length") == 1
+    assert (
+        page.evaluate(f"{rows}.filter(b => b.getAttribute('aria-pressed') === 'true').length") == 1
+    )
     page.until("dhkit.stage.overlays.skeletons.count === 7")
     inside = page.evaluate(
         f"{rows}.find(b => b.getAttribute('aria-pressed') === 'false' && !b.querySelector('small')).dataset.branch"
@@ -338,16 +359,23 @@ def test_an_edit_shows_the_numbers_that_the_api_gives_and_is_undone(kept_page):
     page.until(f"Math.abs(dhkit.lab.state.tool.T[3] - {float(expected[0, 3])!r}) < 1e-12")
     assert np.abs(numbers(page) - expected).max() < 1e-9
     panel(page, "tool")
-    shown = page.evaluate("[...document.querySelectorAll('.pose .number')].map(i => Number(i.value))")
+    shown = page.evaluate(
+        "[...document.querySelectorAll('.pose .number')].map(i => Number(i.value))"
+    )
     assert np.abs(np.array(shown[:3]) - expected[:3, 3]).max() < PRINTED
     panel(page, "table")
     write(page, "alpha of row 1", "pi/no")
     page.until(f"{labelled('alpha of row 1')}.getAttribute('aria-invalid') === 'true'")
-    assert page.evaluate("document.querySelector('#panel-table .note').classList.contains('bad')") is True
+    assert (
+        page.evaluate("document.querySelector('#panel-table .note').classList.contains('bad')")
+        is True
+    )
     assert np.abs(numbers(page) - expected).max() < 1e-12  # the last good arm stands
     for _ in range(2):
         page.click(button("Undo"))
-    page.until(f"Math.abs(dhkit.lab.state.tool.T[3] - {float(first.fk(lab.desk.q)[0, 3])!r}) < 1e-12")
+    page.until(
+        f"Math.abs(dhkit.lab.state.tool.T[3] - {float(first.fk(lab.desk.q)[0, 3])!r}) < 1e-12"
+    )
     page.until(f"{labelled('alpha of row 1')}.getAttribute('aria-invalid') === 'false'")
     page.settle()
     page.choose(labelled("Convention"), "modified")
@@ -369,15 +397,24 @@ def test_two_edits_in_a_row_are_both_made(kept_page):
     lab, page = kept_page("puma560")
     panel(page, "table")
     page.click(labelled("a of row 2"))
-    page.call("Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"])
+    page.call(
+        "Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"]
+    )
     for letter in "0.5":
         page.press(letter)
     page.press("Tab")  # to alpha of row 2, and on while the first edit is under way
-    page.call("Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"])
+    page.call(
+        "Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"]
+    )
     for letter in "0.1":
         page.press(letter)
     page.press("Tab")
-    wait_for(lambda: lab.desk.arm.description.numbers.a[1] == 0.5 and lab.desk.arm.description.numbers.alpha[1] == 0.1)
+    wait_for(
+        lambda: (
+            lab.desk.arm.description.numbers.a[1] == 0.5
+            and lab.desk.arm.description.numbers.alpha[1] == 0.1
+        )
+    )
 
 
 @only_accepting
@@ -386,14 +423,26 @@ def test_the_four_transforms_of_a_row_are_animated(visit):
     panel(page, "table")
     page.click("document.querySelector('#panel-table tbody tr:nth-child(2) button')")
     page.until("dhkit.stage.moving?.visible")
-    page.until("document.querySelectorAll('.step li').length === 4 && document.querySelector('.step li.now')")
+    page.until(
+        "document.querySelectorAll('.step li').length === 4 && document.querySelector('.step li.now')"
+    )
     seen = set()
     deadline = time.monotonic() + 6
-    while page.evaluate("Boolean(document.querySelector('.step li.now'))") and time.monotonic() < deadline:
-        seen.add(page.evaluate("[...document.querySelectorAll('.step li')].findIndex(li => li.className === 'now')"))
+    while (
+        page.evaluate("Boolean(document.querySelector('.step li.now'))")
+        and time.monotonic() < deadline
+    ):
+        seen.add(
+            page.evaluate(
+                "[...document.querySelectorAll('.step li')].findIndex(li => li.className === 'now')"
+            )
+        )
     assert {0, 1, 2, 3} <= seen | {-1}
     end = lab.desk.arm.frames(lab.desk.q)[2]
-    assert np.abs(np.array(page.evaluate("dhkit.stage.moving.position.toArray()")) - end[:3, 3]).max() < 1e-6
+    assert (
+        np.abs(np.array(page.evaluate("dhkit.stage.moving.position.toArray()")) - end[:3, 3]).max()
+        < 1e-6
+    )
     page.until("!dhkit.stage.moving.visible")
 
 
@@ -412,7 +461,10 @@ def test_the_transforms_of_all_rows_are_animated_with_their_entries_lit(visit):
     assert seen[-1] == order[-1]
     assert [label for label in order if label in seen] == seen  # a busy page may leave some out
     end = lab.desk.arm.frames(lab.desk.q)[2]
-    assert np.abs(np.array(page.evaluate("dhkit.stage.moving.position.toArray()")) - end[:3, 3]).max() < 1e-6
+    assert (
+        np.abs(np.array(page.evaluate("dhkit.stage.moving.position.toArray()")) - end[:3, 3]).max()
+        < 1e-6
+    )
 
 
 def test_a_person_makes_an_arm_of_two_joints(visit):
@@ -451,7 +503,9 @@ def test_a_motion_is_planned_played_scrubbed_and_taken_over(kept_page):
     page.drag([(x + 40, y), (x + 20, y), (x, y)])
     middle = page.evaluate("dhkit.player.time")
     assert middle == pytest.approx(0.75, abs=0.05)
-    assert np.abs(page.evaluate(f"[...{of('joints')}.q]") - lab._motions.motion.q(middle)).max() < 1e-3
+    assert (
+        np.abs(page.evaluate(f"[...{of('joints')}.q]") - lab._motions.motion.q(middle)).max() < 1e-3
+    )
     assert np.abs(lab.desk.q - start).max() == 0
     page.click(button("Teach this state"))
     wait_for(lambda: len(lab._motions.waypoints) == 1)
@@ -508,7 +562,9 @@ def test_a_file_is_chosen(kept_page, tmp_path):
     saved = lab.desk.arm.quintic(np.zeros(6), lab.desk.q, 2.0).save(tmp_path / "mine.csv")
     panel(page, "motion")
     root = page.call("DOM.getDocument")["root"]["nodeId"]
-    node = page.call("DOM.querySelector", nodeId=root, selector="#panel-motion input[type=file]")["nodeId"]
+    node = page.call("DOM.querySelector", nodeId=root, selector="#panel-motion input[type=file]")[
+        "nodeId"
+    ]
     page.call("DOM.setFileInputFiles", nodeId=node, files=[str(saved)])
     page.until("dhkit.lab.state.motion?.kind === 'file'")
     assert told(page, "motion")["duration"] == pytest.approx(2.0)
@@ -532,7 +588,11 @@ def test_a_controller_is_started_pushed_changed_and_stopped(visit):
     assert calm < 1e-3
     write(page, "Force along z, N", "-200")
     page.click(button("Push"))
-    wait_for(lambda: np.abs(lab.desk.q - lab.desk.arm.configurations["nominal"]).max() > 10 * max(calm, 1e-5))
+    wait_for(
+        lambda: (
+            np.abs(lab.desk.q - lab.desk.arm.configurations["nominal"]).max() > 10 * max(calm, 1e-5)
+        )
+    )
     page.choose(labelled_list("Controller"), "pid")
     wait_for(lambda: lab._control.settings.controller == "pid")
     write(page, "Payload", "2")
@@ -563,7 +623,16 @@ def test_joints_2_and_3_alone_and_an_arm_without_bodies(visit):
     page.choose(labelled_list("Follows"), "sine")
     page.click(button("Start"))
     page.until(f"{of('control')}.rows.length > 10")
-    assert page.evaluate(f"{of('control')}.columns") == ["t", "q2", "q3", "e2", "e3", "tau2", "tau3", "tool"]
+    assert page.evaluate(f"{of('control')}.columns") == [
+        "t",
+        "q2",
+        "q3",
+        "e2",
+        "e3",
+        "tau2",
+        "tau3",
+        "tool",
+    ]
     page.click(button("Stop"))
     page.until("!dhkit.lab.state.control.running")
 
@@ -630,7 +699,12 @@ def test_every_control_is_reached_by_the_keyboard(visit):
         for _ in range(count + 3):
             page.evaluate("visited.add(document.activeElement)")
             page.press("Tab")
-        assert page.evaluate("[...wanted].filter(e => !visited.has(e)).map(e => e.outerHTML.slice(0, 120))") == []
+        assert (
+            page.evaluate(
+                "[...wanted].filter(e => !visited.has(e)).map(e => e.outerHTML.slice(0, 120))"
+            )
+            == []
+        )
         unnamed = page.evaluate(
             "[...wanted].filter(e => !(e.ariaLabel || e.labels?.length || e.textContent.trim() || e.title))"
             ".map(e => e.outerHTML.slice(0, 120))"
@@ -648,7 +722,9 @@ def test_names_with_html_are_text_everywhere(visit):
     lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": nearby(lab).tolist()}})
     lab.answer("tool.jog", {"axis": 0, "step": -0.01})
     lab.answer("waypoints.add", {})
-    page.until("dhkit.lab.state.motion && dhkit.lab.state.target && dhkit.lab.state.waypoints.length")
+    page.until(
+        "dhkit.lab.state.motion && dhkit.lab.state.target && dhkit.lab.state.waypoints.length"
+    )
     # Python refuses such names in a robot file; the page relies on nobody.
     page.evaluate(
         f"""(() => {{
@@ -692,7 +768,13 @@ def test_a_lost_connection_is_said_and_a_wish_meanwhile_too(visit):
 
 # What it looks like
 
-LAYOUTS = [(390, 844, True), (768, 1024, False), (768, 1024, True), (1280, 720, False), (1280, 720, True)]
+LAYOUTS = [
+    (390, 844, True),
+    (768, 1024, False),
+    (768, 1024, True),
+    (1280, 720, False),
+    (1280, 720, True),
+]
 
 
 def nearby(lab):
@@ -713,7 +795,9 @@ def act(page, lab, name):
         page.until("dhkit.stage.moving?.visible")
     if name == "motion":
         lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": nearby(lab).tolist()}})
-        page.until("dhkit.lab.state.motion && dhkit.player.time > Math.min(0.3, 0.9 * dhkit.lab.state.motion.duration)")
+        page.until(
+            "dhkit.lab.state.motion && dhkit.player.time > Math.min(0.3, 0.9 * dhkit.lab.state.motion.duration)"
+        )
         page.evaluate("dhkit.lab.dock.open || dhkit.lab.dock.toggle()")  # folded on phones
         wait_for(lambda: plots(page, "motion") >= 2)
     if name == "control":
@@ -899,7 +983,9 @@ def test_gate_of_a_stream_of_poses(visit, slack):
     rate = drawn(page, seconds - 1.0)
     thread.join()
     share = (time.process_time() - cpu) / (time.monotonic() - started)
-    print(f"60 Hz at 860x720: {rate:.1f} pictures a second, {100 * share:.1f} % of a core in Python")
+    print(
+        f"60 Hz at 860x720: {rate:.1f} pictures a second, {100 * share:.1f} % of a core in Python"
+    )
     assert rate > 20 / slack()
     assert share < 0.10 * slack()
     page.settle()
@@ -916,7 +1002,9 @@ def test_gate_of_one_message_against_one_a_link(visit, stock):
             show(np.full(6, 0.01 * k))
             took[name].append(time.perf_counter() - start)
     ours, theirs = (float(np.median(took[name])) for name in ("ours", "stock"))
-    print(f"to show a state: {1e3 * ours:.3f} ms, a message a link with the stock display {1e3 * theirs:.3f} ms")
+    print(
+        f"to show a state: {1e3 * ours:.3f} ms, a message a link with the stock display {1e3 * theirs:.3f} ms"
+    )
     assert theirs > 4 * ours
 
 
@@ -928,7 +1016,9 @@ def test_gate_of_a_running_controller(visit, slack):
     page.click(button("Start"))
     page.until(f"{of('control')}.rows.length > 60")
     rate = drawn(page, 4.0)
-    print(f"control at 60 Hz, 860x720: {rate:.1f} pictures a second, {lab._control._speed:.2f} of real time")
+    print(
+        f"control at 60 Hz, 860x720: {rate:.1f} pictures a second, {lab._control._speed:.2f} of real time"
+    )
     assert rate > 20 / slack()
     page.click(button("Stop"))
 

@@ -110,7 +110,9 @@ def memory():
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
-needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no /proc: memory cannot be read")
+needs_proc = pytest.mark.skipif(
+    not Path("/proc/self/statm").exists(), reason="no /proc: memory cannot be read"
+)
 
 
 def run(coroutine):
@@ -136,12 +138,16 @@ class Client:
     async def request(self, name, data):
         """Ask, and return the question's number at once."""
         self.count += 1
-        await self.send(json.dumps({"type": "request", "id": self.count, "name": name, "data": data}))
+        await self.send(
+            json.dumps({"type": "request", "id": self.count, "name": name, "data": data})
+        )
         return self.count
 
     async def receive(self):
         """Return the next message; None, also again, when the connection has ended."""
-        message = None if self.ended else await asyncio.wait_for(self.connection.read_message(), HANGS)
+        message = (
+            None if self.ended else await asyncio.wait_for(self.connection.read_message(), HANGS)
+        )
         self.ended = message is None
         return message
 
@@ -149,7 +155,9 @@ class Client:
         """Take the next message; return it if it is a text that is no beat."""
         message = await self.receive()
         if isinstance(message, bytes):
-            await self.send(json.dumps({"type": "shown", "sequence": decode_header(message).sequence}))
+            await self.send(
+                json.dumps({"type": "shown", "sequence": decode_header(message).sequence})
+            )
             self._note(message)
             return None
         found = json.loads(message or "null")
@@ -371,7 +379,9 @@ def test_a_message_of_10_MB_in_fragments_too(lab):
     run(slider_works(lab.url))
 
 
-@pytest.mark.parametrize("data", [b"\x00" * 100, b"\xff" * 100, b"\xc1\x85" + bytes(4) + b"aaaaa", b"\x81\x05hello"])
+@pytest.mark.parametrize(
+    "data", [b"\x00" * 100, b"\xff" * 100, b"\xc1\x85" + bytes(4) + b"aaaaa", b"\x81\x05hello"]
+)
 def test_frames_that_are_no_websocket_end_their_page(lab, data):
     connection = raw_socket(lab)
     connection.sendall(data)
@@ -439,7 +449,11 @@ def fill(connection, message, url):
 def test_a_page_that_takes_no_answers_is_not_read_from(lab):
     """A page asks for megabytes of answers and never reads."""
     lab._requests["table.download"] = lambda data: {"content": "x" * 50_000}
-    request = frame(json.dumps({"type": "request", "id": 1, "name": "table.download", "data": {"format": "toml"}}))
+    request = frame(
+        json.dumps(
+            {"type": "request", "id": 1, "name": "table.download", "data": {"format": "toml"}}
+        )
+    )
     nonsense = frame("{")
     before = memory()
     for message in (request, nonsense):
@@ -485,7 +499,9 @@ def test_many_pages_at_once_are_each_answered_and_see_the_same(lab):
             deadline = time.monotonic() + HANGS
             while any(client.states.get("joints") != last for client in clients):
                 assert time.monotonic() < deadline, "a page shows something else"
-                await asyncio.gather(*(client.ask("tool.order", {"order": "XYZ"}) for client in clients))
+                await asyncio.gather(
+                    *(client.ask("tool.order", {"order": "XYZ"}) for client in clients)
+                )
 
     run(together())
 
@@ -505,7 +521,9 @@ def test_more_pages_than_can_be_served_are_turned_away(lab):
 
 @pytest.mark.parametrize("abrupt", [False, True])
 def test_a_page_may_go_while_it_is_answered(lab, abrupt):
-    request = frame(json.dumps({"type": "request", "id": 1, "name": "joints.named", "data": {"name": "random"}}))
+    request = frame(
+        json.dumps({"type": "request", "id": 1, "name": "joints.named", "data": {"name": "random"}})
+    )
     for _ in range(20):
         connection = raw_socket(lab)
         connection.sendall(request * 20)
@@ -529,7 +547,9 @@ def test_what_a_page_asked_for_is_not_done_when_it_has_gone(lab):
 
     lab._requests["joints.named"] = slow
     connection = raw_socket(lab)
-    connection.sendall(frame(json.dumps({"type": "request", "id": 1, "name": "joints.named", "data": {}})) * 30)
+    connection.sendall(
+        frame(json.dumps({"type": "request", "id": 1, "name": "joints.named", "data": {}})) * 30
+    )
     assert begun.wait(HANGS)
     connection.close()
     wait_for(lambda: not lab.view._live().pages)
@@ -559,8 +579,15 @@ def test_what_waits_for_a_page_that_never_acknowledges_is_bounded(lab):
     waiting = slow.session._waiting
     assert len(waiting) <= len(server._state)
     for kept in (waiting, server._state):
-        assert all(m.rows.size <= BOUNDS.sample_numbers for *_, m in kept.values() if isinstance(m, Samples))
-    assert not slow.ws_connection.stream.writing() or len(slow.ws_connection.stream._write_buffer) < 2e6
+        assert all(
+            m.rows.size <= BOUNDS.sample_numbers
+            for *_, m in kept.values()
+            if isinstance(m, Samples)
+        )
+    assert (
+        not slow.ws_connection.stream.writing()
+        or len(slow.ws_connection.stream._write_buffer) < 2e6
+    )
     run(slider_works(lab.url))
     lab.answer("control.stop", {})
     connection.close()
@@ -669,8 +696,13 @@ def test_a_result_that_cannot_be_shown_is_an_error_of_its_job(lab):
 @pytest.mark.slow
 def test_a_file_that_unpacks_to_gigabytes_is_refused(lab):
     packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("q.npy", "w") as entry:
-        np.lib.format.write_array_header_1_0(entry, {"descr": "<f8", "fortran_order": False, "shape": (50_000_000,)})
+    with (
+        zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("q.npy", "w") as entry,
+    ):
+        np.lib.format.write_array_header_1_0(
+            entry, {"descr": "<f8", "fortran_order": False, "shape": (50_000_000,)}
+        )
         for _ in range(400):
             entry.write(bytes(1_000_000))
     before = memory()
@@ -708,7 +740,12 @@ def test_nothing_that_a_page_says_reaches_the_file_system(lab):
         "marked.mat",
         "marked.yaml",
     ]
-    table = "t," + ",".join(f"q{i}" for i in range(1, 7)) + "\n" + "".join(f"{k},0,0,0,0,0,{k}\n" for k in range(5))
+    table = (
+        "t,"
+        + ",".join(f"q{i}" for i in range(1, 7))
+        + "\n"
+        + "".join(f"{k},0,0,0,0,0,{k}\n" for k in range(5))
+    )
     content = base64.b64encode(table.encode()).decode()
     before = set(Path(tempfile.gettempdir()).glob("dhkit-lab-*"))
     lab.answer("motion.file", {"name": "first.csv", "content": content})  # imports what it needs
@@ -721,7 +758,9 @@ def test_nothing_that_a_page_says_reaches_the_file_system(lab):
         kinds = []
         async with page(lab.url) as client:
             for name in names:
-                kinds.append((await client.ask("motion.file", {"name": name, "content": content}))["type"])
+                kinds.append(
+                    (await client.ask("motion.file", {"name": name, "content": content}))["type"]
+                )
             for request in ("table.download", "motion.download", "control.download"):
                 for form in ("../marked", "/marked", "marked\0", "csv/../marked"):
                     kinds.append((await client.ask(request, {"format": form}))["type"])
@@ -772,7 +811,10 @@ def program(*arguments):
     )
     try:
         line = process.stdout.readline()
-        yield process, next((word.rstrip(";") for word in line.split() if word.startswith("http")), None)
+        yield (
+            process,
+            next((word.rstrip(";") for word in line.split() if word.startswith("http")), None),
+        )
     finally:
         process.kill()
         process.communicate(timeout=HANGS)
@@ -806,7 +848,9 @@ def test_ctrl_c_ends_it_cleanly(command, asked, begun):
     async def ask_and_interrupt(process, url):
         async with page(url) as client:
             for name, data in asked:
-                assert (await client.ask(name, data))["type"] == ("answer" if command == "lab" else "error")
+                assert (await client.ask(name, data))["type"] == (
+                    "answer" if command == "lab" else "error"
+                )
             while not begun(client.states):
                 await client.take()
                 assert not client.ended
@@ -846,7 +890,10 @@ def test_a_page_finds_a_restarted_lab_at_the_same_address(tmp_path, monkeypatch)
             assert none is None
             _, errors = second.communicate(timeout=HANGS)
             assert second.returncode == 2
-            assert errors.startswith("dhkit: the viewer's server did not start") and errors.count("\n") == 1
+            assert (
+                errors.startswith("dhkit: the viewer's server did not start")
+                and errors.count("\n") == 1
+            )
 
 
 @pytest.fixture
@@ -883,7 +930,9 @@ def test_a_folder_that_others_can_write_is_refused(state_folder):
 
 
 @posix
-@pytest.mark.parametrize("damage", ["readable", "writable", "short", "foreign", "link", "folderless"])
+@pytest.mark.parametrize(
+    "damage", ["readable", "writable", "short", "foreign", "link", "folderless"]
+)
 def test_a_token_that_others_may_know_is_not_used_again(state_folder, damage, tmp_path):
     token = kept_token(5000)
     path = state_folder / "lab-5000.token"

@@ -40,7 +40,8 @@ def test_only_the_latest_job_counts():
 
 
 @pytest.mark.parametrize(
-    ("error", "text"), [(ValueError("no  such"), "no such"), (OSError("disk"), "OSError: Python's log says more")]
+    ("error", "text"),
+    [(ValueError("no  such"), "no such"), (OSError("disk"), "OSError: Python's log says more")],
 )
 def test_a_job_that_fails_says_so_in_one_line(error, text):
     states = []

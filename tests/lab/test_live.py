@@ -36,18 +36,26 @@ def test_damping_below_twice_the_inertia_times_the_rate_is_let_be(kd):
 
 @pytest.mark.parametrize("kd", [2.2, 3.0, 10.0])
 def test_damping_above_it_is_stopped_with_the_reason(kd):
-    with pytest.raises(SimulationError, match=r"changes its sign at every sample and grows; at 500 Hz its damping kd"):
+    with pytest.raises(
+        SimulationError,
+        match=r"changes its sign at every sample and grows; at 500 Hz its damping kd",
+    ):
         run(kd)
 
 
 def test_a_sliding_mode_that_chatters_is_let_be():
-    assert run(0.0, law=lambda q, qd: -0.2 * np.sign(q - [0.3, 0.4, 0.1, 0.001] + 0.01 * qd)).t == pytest.approx(0.5)
+    assert run(
+        0.0, law=lambda q, qd: -0.2 * np.sign(q - [0.3, 0.4, 0.1, 0.001] + 0.01 * qd)
+    ).t == pytest.approx(0.5)
 
 
 def test_rounding_alone_and_a_constant_alternation_are_let_be():
     watch = AlternationWatch(2)
     sizes = [1e-9 * 1.5**k for k in range(15)]
-    assert all(watch.unstable_joint(np.array([size, -size]) * (-1) ** k) is None for k, size in enumerate(sizes))
+    assert all(
+        watch.unstable_joint(np.array([size, -size]) * (-1) ** k) is None
+        for k, size in enumerate(sizes)
+    )
     watch = AlternationWatch(1)
     assert all(watch.unstable_joint(np.array([(-1.0) ** k])) is None for k in range(200))
     watch = AlternationWatch(3)

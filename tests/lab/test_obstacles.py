@@ -19,7 +19,9 @@ def test_an_obstacle_is_placed_moved_resized_and_removed(open_lab):
     lab = open_lab("puma560")
     assert lab.answer("obstacles.add", {"kind": "box"}) == {"index": 0}
     assert lab.answer("obstacles.add", {"kind": "cylinder"}) == {"index": 1}
-    lab.answer("obstacles.set", {"index": 0, "T": BETWEEN.ravel().tolist(), "sizes": [0.1, 0.2, 0.3]})
+    lab.answer(
+        "obstacles.set", {"index": 0, "T": BETWEEN.ravel().tolist(), "sizes": [0.1, 0.2, 0.3]}
+    )
     box, cylinder = lab.desk.scene
     assert np.array_equal(box.T_world_obstacle, BETWEEN)
     assert np.allclose(2 * box.half_sizes, [0.1, 0.2, 0.3])
@@ -43,7 +45,11 @@ def test_an_obstacle_is_placed_moved_resized_and_removed(open_lab):
         ("obstacles.set", {"index": 0, "sizes": [1, 2, 0]}, "at least 0.001 m"),
         ("obstacles.set", {"index": 0, "sizes": [1, 2, 1e9]}, "at most 1000"),
         ("obstacles.set", {"index": 0, "T": [1.0] * 16}, "a pose"),
-        ("obstacles.set", {"index": 0, "T": [1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}, "farther than"),
+        (
+            "obstacles.set",
+            {"index": 0, "T": [1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+            "farther than",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_and_nothing_changes(open_lab, request_name, data, complaint):
@@ -91,7 +97,9 @@ def plan(lab, kind="least-time"):
 def test_a_motion_in_least_time_goes_around_them_and_python_says_how(open_lab):
     lab = open_lab("puma560")
     lab.answer("obstacles.add", {"kind": "box"})
-    lab.answer("obstacles.set", {"index": 0, "T": BETWEEN.ravel().tolist(), "sizes": [0.1, 0.1, 0.5]})
+    lab.answer(
+        "obstacles.set", {"index": 0, "T": BETWEEN.ravel().tolist(), "sizes": [0.1, 0.1, 0.5]}
+    )
     shown = plan(lab)
     assert "clearance: 10 mm kept from obstacles" in shown["motion"]["notes"][0]
     motion = lab._motions.motion
@@ -145,7 +153,9 @@ def test_a_person_places_drags_resizes_and_removes_one(open_page):
     panel(page, "motion")
     page.click(button("Box"))
     page.until("dhkit.lab.state.obstacles.length === 1")
-    assert page.evaluate("dhkit.lab.panels.find(p => p.name === 'motion').panel.obstacles.gizmo.group.visible")
+    assert page.evaluate(
+        "dhkit.lab.panels.find(p => p.name === 'motion').panel.obstacles.gizmo.group.visible"
+    )
     before = lab.desk.scene[0].centre.copy()
 
     # The tip of the upward arrow, on screen, is dragged upwards.
@@ -158,10 +168,14 @@ def test_a_person_places_drags_resizes_and_removes_one(open_page):
     assert np.allclose(moved[:2], before[:2], atol=1e-6)
 
     sizes = labelled("Sizes of box 1: edges")
-    page.evaluate(f"{sizes}.focus(), {sizes}.value = '0.1 0.2 0.3', {sizes}.dispatchEvent(new Event('change'))")
+    page.evaluate(
+        f"{sizes}.focus(), {sizes}.value = '0.1 0.2 0.3', {sizes}.dispatchEvent(new Event('change'))"
+    )
     page.until("dhkit.lab.state.obstacles[0].sizes[1] === 0.2")
     page.evaluate(f"{sizes}.value = '0.1 nothing', {sizes}.dispatchEvent(new Event('change'))")
-    page.until("document.querySelector('#lab .message').textContent.includes('three positive numbers')")
+    page.until(
+        "document.querySelector('#lab .message').textContent.includes('three positive numbers')"
+    )
     page.click(labelled("Remove box 1"))
     page.until("dhkit.lab.state.obstacles.length === 0")
     assert lab.desk.scene == ()

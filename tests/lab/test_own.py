@@ -58,7 +58,9 @@ def test_it_is_compared_where_the_arm_is_and_scored(beside):
     lab, _ = beside(solution("sign of the elbow"))
     lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
     # The first comparison may be of the state where the lab began, whose elbow's sign does not matter.
-    wait_for(lambda: (own(lab).get("ik", {}).get("count"), own(lab).get("ik", {}).get("right")) == (8, 0))
+    wait_for(
+        lambda: (own(lab).get("ik", {}).get("count"), own(lab).get("ik", {}).get("right")) == (8, 0)
+    )
     assert own(lab)["fk"]["distance"] < 1e-12
     wait_for(lambda: own(lab).get("report"))
     assert own(lab)["report"]["points"] == 100 and "joint 3 (elbow)" in str(own(lab)["report"])
@@ -123,7 +125,9 @@ def test_its_controller_is_in_the_list_and_drives_the_arm(beside):
 def test_the_simulated_time_is_that_of_the_frames(open_lab, monkeypatch):
     lab, steps = open_lab("planar2r"), []
     simulate = lab._control._simulate_frame
-    monkeypatch.setattr(lab._control, "_simulate_frame", lambda live, n: steps.append(n) or simulate(live, n))
+    monkeypatch.setattr(
+        lab._control, "_simulate_frame", lambda live, n: steps.append(n) or simulate(live, n)
+    )
     lab.answer("control.start", {"reference": "hold", "controller": "pd-gravity"})
     wait_for(lambda: len(steps) > 40)
     lab.answer("control.stop", {})
@@ -141,7 +145,9 @@ def test_without_one_there_is_nothing_of_it(open_lab):
 
 def test_a_score_is_about_the_arm_on_show_alone(tmp_path):
     source = tmp_path / "mine.py"
-    source.write_text("def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n")
+    source.write_text(
+        "def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+    )
     with Lab(Arm.load("planar2r"), own=source) as lab:
         wait_for(lambda: lab._own._state.get("report"))
         lab.answer("table.edit", {"row": 0, "column": "a", "text": "0.7"})
@@ -154,7 +160,9 @@ def test_a_score_is_about_the_arm_on_show_alone(tmp_path):
 
 
 def test_an_unstable_controller_stops_early_with_the_reason(beside):
-    lab, _ = beside("def controller(t, q, qd, setpoint):\n    return 300 * (setpoint.q - q) - 1e5 * qd\n")
+    lab, _ = beside(
+        "def controller(t, q, qd, setpoint):\n    return 300 * (setpoint.q - q) - 1e5 * qd\n"
+    )
     wait_for(lambda: "own" in [one["name"] for one in states(lab)["control"]["controllers"]])
     lab.answer("control.start", {"controller": "own", "reference": "sine"})
     wait_for(lambda: states(lab)["control"]["error"])

@@ -109,11 +109,15 @@ def test_the_distance_of_a_planar_arm_is_that_of_two_circles():
 def test_a_stretched_puma_is_at_its_outer_boundary_and_no_state_is_beyond():
     arm = Arm.load("puma560")
     n = arm.description.numbers
-    straight = -np.pi / 2 + np.arctan2(n.a[2], n.d[3])  # the wrist's centre in line with the upper arm
+    straight = -np.pi / 2 + np.arctan2(
+        n.a[2], n.d[3]
+    )  # the wrist's centre in line with the upper arm
     distance, boundary, point = boundary_distance(arm, [0.4, 0.3, straight, 0, 0, 0])
     assert point == "wrist centre"
     assert (distance < CHORD) or boundary != "outer"
-    best = min(boundary_distance(arm, [0.4, 0.3, q3, 0, 0, 0])[0] for q3 in np.linspace(-np.pi, np.pi, 721))
+    best = min(
+        boundary_distance(arm, [0.4, 0.3, q3, 0, 0, 0])[0] for q3 in np.linspace(-np.pi, np.pi, 721)
+    )
     assert best < CHORD + 1e-4
     rng = np.random.default_rng(0)
     distances = [boundary_distance(arm, q)[0] for q in rng.uniform(-3, 3, (300, 6))]
@@ -134,7 +138,9 @@ def test_points_and_a_slice_are_sampled_in_the_background(open_lab):
     assert found["count"] == 10_000
     lab.answer("joints.set", {"q": [0.7, 1.0, 0.8, 0, 0.5, 0]})
     lab.answer("workspace.show", {"kind": "slice"})
-    found = wait(lab, "workspace", lambda space: space["progress"] is None and space["kind"] == "slice")
+    found = wait(
+        lab, "workspace", lambda space: space["progress"] is None and space["kind"] == "slice"
+    )
     points = decode_points(lab.view._state[Slot.POINTS]).points
     assert len(points) == found["count"] > 1000
     tool = lab.desk.arm.fk(lab.desk.q)[:3, 3]
@@ -160,11 +166,17 @@ def test_a_chain_about_current_axes_is_the_reversed_chain_about_fixed_ones(open_
         ("turn", "y", "-1.1"),
         ("move", "z", "2*inch"),
     ]
-    current = lab.answer("transforms.apply", {"steps": [step(*one, "current") for one in chain]})["steps"]
-    fixed = lab.answer("transforms.apply", {"steps": [step(*one, "fixed") for one in reversed(chain)]})["steps"]
+    current = lab.answer("transforms.apply", {"steps": [step(*one, "current") for one in chain]})[
+        "steps"
+    ]
+    fixed = lab.answer(
+        "transforms.apply", {"steps": [step(*one, "fixed") for one in reversed(chain)]}
+    )["steps"]
     assert np.abs(np.array(current[-1]["T"]) - fixed[-1]["T"]).max() < 1e-15
     expected = (
-        pose(euler=(np.pi / 6, 0, 0), order="ZYX") @ pose((0.2, 0, 0)) @ pose(euler=(np.pi / 2, 0, 0), order="XYZ")
+        pose(euler=(np.pi / 6, 0, 0), order="ZYX")
+        @ pose((0.2, 0, 0))
+        @ pose(euler=(np.pi / 2, 0, 0), order="XYZ")
     )
     assert np.abs(np.reshape(current[2]["T"], (4, 4)) - expected).max() < 1e-15
     assert all(text.startswith("<math") for one in current for text in one["formulas"])
@@ -181,7 +193,8 @@ def test_the_operator_of_a_step_takes_vertices_to_where_they_are_told(open_lab):
     ]
     found = lab.answer("transforms.apply", {"steps": steps})
     before, E, T = (
-        np.reshape(x, (4, 4)) for x in (found["steps"][1]["T"], found["steps"][2]["E"], found["steps"][2]["T"])
+        np.reshape(x, (4, 4))
+        for x in (found["steps"][1]["T"], found["steps"][2]["E"], found["steps"][2]["T"])
     )
     operator = before @ E @ np.linalg.inv(before)
     assert np.abs(operator @ before - T).max() < 1e-12
@@ -197,7 +210,10 @@ def test_the_operator_of_a_step_takes_vertices_to_where_they_are_told(open_lab):
         ([step("turn", "z", "1", "fixed")] * 31, "expected a list of at most 30 steps"),
         (["turn"], "step 1: expected kind, axis, amount and about"),
         ([step("turn", "w", "1", "fixed")], "step 1: axis is 'w'"),
-        ([step("turn", "z", "1", "fixed"), step("shear", "z", "1", "fixed")], "step 2: kind is 'shear'"),
+        (
+            [step("turn", "z", "1", "fixed"), step("shear", "z", "1", "fixed")],
+            "step 2: kind is 'shear'",
+        ),
         ([step("turn", "z", "__import__('os')", "fixed")], "step 1: amount"),
         ([step("turn", "z", "1/0", "fixed")], "step 1: amount"),
         ([step("turn", "z", "1e99", "fixed")], "step 1: amount is beyond"),
@@ -227,7 +243,9 @@ def test_solids_of_files_have_each_vertex_once(tmp_path):
 @pytest.mark.parametrize(("unit", "size"), [("m", 0.3), ("mm", 300.0), ("in", 12.0)])
 def test_the_unit_of_a_solid_is_found_by_its_size_and_chosen(tmp_path, unit, size):
     path = tmp_path / "part.stl"
-    path.write_bytes(trimesh.exchange.stl.export_stl(trimesh.creation.box((size, size / 2, size / 3))))
+    path.write_bytes(
+        trimesh.exchange.stl.export_stl(trimesh.creation.box((size, size / 2, size / 3)))
+    )
     with Lab(Arm.load("puma560"), solid=path) as lab:
         assert state(lab, "solid")["unit"] == unit
         edges = np.ptp(state(lab, "solid")["vertices"], axis=0)
@@ -252,7 +270,11 @@ def test_the_box_without_a_file_has_no_unit(open_lab):
         ("a.obj", b"", "expected .stl"),
         ("missing.stl", None, "No such file"),
         ("empty.stl", b"", "no STL|no triangles|empty file"),
-        ("short.stl", b"x" * 80 + (100).to_bytes(4, "little") + b"\0" * 50, "no STL|no triangles|empty file"),
+        (
+            "short.stl",
+            b"x" * 80 + (100).to_bytes(4, "little") + b"\0" * 50,
+            "no STL|no triangles|empty file",
+        ),
         ("words.stl", b"solid of nothing", "no STL|no triangles|empty file"),
         ("large.stl", b"\0" * 5_000_001, "expected a file of at most"),
         (
@@ -290,7 +312,10 @@ RIGHT = "M22 = m2*l2^2/3\ng2 = m2*g*l2*c12/2"
 def test_answers_are_read_judged_and_explained(open_lab):
     lab = open_lab("planar2r")
     right = judged(lab, "lines", RIGHT)
-    assert {entry["name"]: entry["verdict"] for entry in right["entries"]} == {"M22": "correct", "g2": "correct"}
+    assert {entry["name"]: entry["verdict"] for entry in right["entries"]} == {
+        "M22": "correct",
+        "g2": "correct",
+    }
     assert right["missing"] == ["M11", "M12", "M21", "g1"]
     wrong = judged(lab, "lines", "g2 = m2*g*l2\n   *c2/2")
     (entry,) = wrong["entries"]
@@ -299,7 +324,12 @@ def test_answers_are_read_judged_and_explained(open_lab):
     assert entry["difference"].startswith("<math")
     assert "q1" in entry["witness"]
     assert any("angle" in one["sentence"] for one in wrong["diagnosis"])
-    assert judged(lab, "latex", r"\[ g_2 = \frac12 m_2 g l_2 \cos(q_1+q_2) \]")["entries"][0]["verdict"] == "correct"
+    assert (
+        judged(lab, "latex", r"\[ g_2 = \frac12 m_2 g l_2 \cos(q_1+q_2) \]")["entries"][0][
+            "verdict"
+        ]
+        == "correct"
+    )
 
 
 def test_programs_are_read_and_never_run(open_lab, tmp_path):
@@ -344,7 +374,11 @@ def test_an_answer_that_cannot_be_read_is_said_in_a_line(open_lab):
 def test_judging_is_ended_with_the_lab_and_when_it_is_cancelled():
     with Lab(Arm.load("puma560")) as lab:
         lab.answer(
-            "submit.grade", {"kind": "lines", "text": "M11 = " + " + ".join(f"c{k % 3 + 1}^{k}" for k in range(1, 60))}
+            "submit.grade",
+            {
+                "kind": "lines",
+                "text": "M11 = " + " + ".join(f"c{k % 3 + 1}^{k}" for k in range(1, 60)),
+            },
         )
         wait_for(judges)
         lab.answer("submit.cancel", {})
@@ -381,7 +415,9 @@ def test_a_sheet_about_another_robot_is_refused_and_no_verdict_stays(open_lab):
     lab = open_lab("planar2r")
     judged(lab, "lines", RIGHT)
     with pytest.raises(ValueError, match="the sheet is about 'puma560'; the arm here is planar2r"):
-        lab.answer("submit.grade", {"kind": "sheet", "text": 'robot = "puma560"\n[answer]\nV = "0"\n'})
+        lab.answer(
+            "submit.grade", {"kind": "sheet", "text": 'robot = "puma560"\n[answer]\nV = "0"\n'}
+        )
     assert state(lab, "verdict") is None
     judged(lab, "lines", RIGHT)
     with pytest.raises(ValueError, match="empty"):

@@ -23,7 +23,9 @@ HOSTILE = '<img src=x onerror="globalThis.hacked=1">'
 
 
 def texts(page, selector):
-    return page.evaluate(f"[...document.querySelectorAll({json.dumps(selector)})].map(e => e.textContent)")
+    return page.evaluate(
+        f"[...document.querySelectorAll({json.dumps(selector)})].map(e => e.textContent)"
+    )
 
 
 @pytest.mark.parametrize("name", ["puma560", "stanford"])
@@ -73,8 +75,12 @@ def test_torques_are_those_of_the_motion_or_the_controller_that_moves_the_arm(op
 def test_an_arm_without_masses_says_what_to_do(open_page):
     _, page = open_page(Arm.from_dh([[0, 0.4, 0, "pi/2"], [0, 0, 0.3, 0]]))
     panel(page, "dynamics")
-    page.until("document.querySelector('#panel-dynamics .note').textContent.includes('assume uniform links')")
-    page.until("document.querySelector('#panel-dynamics .facts').textContent.includes('manipulability')")
+    page.until(
+        "document.querySelector('#panel-dynamics .note').textContent.includes('assume uniform links')"
+    )
+    page.until(
+        "document.querySelector('#panel-dynamics .facts').textContent.includes('manipulability')"
+    )
 
 
 def test_the_workspace_is_drawn_and_the_distance_is_live(kept_page):
@@ -82,12 +88,16 @@ def test_the_workspace_is_drawn_and_the_distance_is_live(kept_page):
     panel(page, "workspace")
     page.choose(labelled("Workspace"), "points")
     page.until("dhkit.stage.overlays.layers.points.group.children.length === 1")
-    page.until("document.querySelector('#panel-workspace .note').textContent.startsWith('10000 points')")
+    page.until(
+        "document.querySelector('#panel-workspace .note').textContent.startsWith('10000 points')"
+    )
     l1, l2 = lab.desk.arm.description.numbers.a
     for q in ([0.3, 0.4], [1.0, 2.0]):
         set_joints(lab, page, q)
         radius = float(np.linalg.norm(lab.desk.arm.fk(q)[:3, 3]))
-        distance = 1000 * min(l1 + l2 - radius, abs(radius - abs(l1 - l2)) if abs(l1 - l2) > 1e-6 else np.inf)
+        distance = 1000 * min(
+            l1 + l2 - radius, abs(radius - abs(l1 - l2)) if abs(l1 - l2) > 1e-6 else np.inf
+        )
         page.until(
             f"Math.abs(parseFloat(document.querySelector('#panel-workspace .distance').textContent) - {distance}) < 0.051"
         )
@@ -182,7 +192,9 @@ def test_every_panel_fits_and_names_its_controls(open_page, sizes):
             )
             assert unnamed == [], where
             assert page.evaluate("document.documentElement.scrollWidth") <= size[0], where
-    assert Arm.load("puma560").n == page.evaluate("document.querySelectorAll('#panel-dynamics .bar').length")
+    assert Arm.load("puma560").n == page.evaluate(
+        "document.querySelectorAll('#panel-dynamics .bar').length"
+    )
 
 
 def test_a_target_out_of_reach_stays_in_the_fields_until_it_is_in_reach(kept_page):

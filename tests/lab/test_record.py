@@ -11,8 +11,9 @@ import dhkit
 from dhkit.cli import main
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.lab import Assignment
+from dhkit.lab.assignment import Place
 from dhkit.lab.marks import find_records, lab_mark
-from dhkit.lab.record import Place, Record, _seal
+from dhkit.lab.record import Record, _seal
 from lab.test_requests import states
 from waiting import wait_for
 
@@ -112,7 +113,13 @@ def test_work_is_recorded_taken_up_again_and_collected(task, tmp_path):
         lab.answer("control.start", {"controller": "computed-torque", "reference": "sine"})
         wait_for(lambda: all(met(lab)))
     mark = lab_mark(file, Assignment.read(task))
-    assert (mark.student, mark.points, mark.most, mark.unchecked, mark.notes) == ("Ada Lovelace", 7.0, 7.0, 2, ())
+    assert (mark.student, mark.points, mark.most, mark.unchecked, mark.notes) == (
+        "Ada Lovelace",
+        7.0,
+        7.0,
+        2,
+        (),
+    )
 
 
 def recorded(task, folder):
@@ -142,10 +149,12 @@ def test_an_edited_record_is_refused(task, tmp_path):
 
 
 SURROGATE = (
-    '{"seal": "\\ud800", "kind": "lab record", "format": 1, "assignment": "", "student": "", "begun": "", "goals": []}'
+    '{"seal": "\\ud800", "kind": "lab record", "format": 1, "assignment": "", "student": "", '
+    '"begun": "", "goals": []}'
 )
 INFINITE = (
-    '{"seal": "", "kind": "lab record", "format": 1, "goals": [{"step": 1e999, "goal": 1, "time": "", "evidence": {}}]}'
+    '{"seal": "", "kind": "lab record", "format": 1, '
+    '"goals": [{"step": 1e999, "goal": 1, "time": "", "evidence": {}}]}'
 )
 FORGED = {
     "a goal with the evidence of another": lambda goals: goals[0]["evidence"].update(q=[0.0, 0.0]),
@@ -219,7 +228,9 @@ def test_marks_of_a_class(task, tmp_path, dhkit_command):
     status, out, _ = dhkit_command("grade", tmp_path / "class", "--task", task)
     assert status == 2
     assert out.count("Ada Lovelace") == 2 and "no record of a lab" in out
-    status, _, _ = dhkit_command("grade", tmp_path / "class", "--task", task, "-o", tmp_path / "marks.csv")
+    status, _, _ = dhkit_command(
+        "grade", tmp_path / "class", "--task", task, "-o", tmp_path / "marks.csv"
+    )
     rows = list(csv.DictReader((tmp_path / "marks.csv").read_text().splitlines()))
     assert [row["points"] for row in rows] == ["5", "5", "0"]
     assert rows[0]["1.1"] == "2"
@@ -235,7 +246,9 @@ def test_record_without_an_assignment_is_refused(dhkit_command, tmp_path):
     status, _, err = dhkit_command("lab", "planar2r", "--record", tmp_path, "--no-browser")
     assert status == 2 and "is not an assignment" in err
     with pytest.raises(ValueError, match="without the file of an assignment"):
-        dhkit.lab.serve(dhkit.Arm.load("planar2r"), block=False, open_browser=False, record=tmp_path)
+        dhkit.lab.serve(
+            dhkit.Arm.load("planar2r"), block=False, open_browser=False, record=tmp_path
+        )
 
 
 def test_places_out_of_range_count_nowhere(task, tmp_path):
@@ -243,7 +256,9 @@ def test_places_out_of_range_count_nowhere(task, tmp_path):
 
     def change(content):
         for step, goal in ((9, 9), (1, 99)):
-            content["goals"].append({"step": step, "goal": goal, "time": "2099-01-01T00:00:00+00:00", "evidence": {}})
+            content["goals"].append(
+                {"step": step, "goal": goal, "time": "2099-01-01T00:00:00+00:00", "evidence": {}}
+            )
 
     edited(file, change, sealed=True)
     with begin(task, tmp_path / "work") as lab:
@@ -293,20 +308,29 @@ def test_a_copied_record_is_noted(task, tmp_path, dhkit_command):
 def test_a_run_of_locked_joints_or_that_stands_still_is_none(task, tmp_path):
     six = ASSIGNMENT.replace("planar2r", "puma560").split("[[step]]")
     task.write_text(
-        six[0].replace("[0.3, 0.3]", '"ready"') + "[[step]]" + six[3].replace("0.3,", '0.3, reference = "motion",')
+        six[0].replace("[0.3, 0.3]", '"ready"')
+        + "[[step]]"
+        + six[3].replace("0.3,", '0.3, reference = "motion",')
     )
     with begin(task, tmp_path / "work") as lab:
         q = lab.desk.q
-        lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": (q + 1e-4).tolist()}, "duration": 2})
+        lab.answer(
+            "motion.plan", {"kind": "quintic", "goal": {"q": (q + 1e-4).tolist()}, "duration": 2}
+        )
         lab.answer("control.start", {"controller": "computed-torque", "reference": "motion"})
         wait_for(lambda: states(lab)["control"]["time"] > 1.0)
         assert met(lab) == [False]
-        lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": (q + 0.5).tolist()}, "duration": 3})
+        lab.answer(
+            "motion.plan", {"kind": "quintic", "goal": {"q": (q + 0.5).tolist()}, "duration": 3}
+        )
         lab.answer("control.start", {"controller": "computed-torque", "reference": "motion"})
         wait_for(lambda: met(lab) == [True])
 
 
 def test_a_goal_names_a_controller_that_the_lab_has(task):
     task.write_text(ASSIGNMENT.replace('"computed-torque"', '"bang-bang"'))
-    with pytest.raises(DescriptionError, match=r"control.controller: found 'bang-bang'; expected one of pd, .*, own"):
+    with pytest.raises(
+        DescriptionError,
+        match=r"control.controller: found 'bang-bang'; expected one of pd, .*, own",
+    ):
         Assignment.read(task)

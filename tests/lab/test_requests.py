@@ -31,7 +31,13 @@ from dhkit.planning.obstacles import LinkBody, shape_distances
 from dhkit.symbolic.equations.sympy_objects import sympy_object
 from dhkit.viewer.protocol import Samples
 from dhkit.viewer.session import Slot
-from viewer.messages import decode_animation, decode_ghosts, decode_pose, decode_samples, decode_state
+from viewer.messages import (
+    decode_animation,
+    decode_ghosts,
+    decode_pose,
+    decode_samples,
+    decode_state,
+)
 from waiting import wait_for
 
 PANELS = (
@@ -62,7 +68,9 @@ def shown(lab):
 
 
 def test_each_request_is_answered_by_one_panel_and_refuses_unknown_fields(open_lab):
-    declared = [h.request for panel in PANELS for h in vars(panel).values() if isinstance(h, RequestHandler)]
+    declared = [
+        h.request for panel in PANELS for h in vars(panel).values() if isinstance(h, RequestHandler)
+    ]
     lab = open_lab("planar2r")
     assert sorted(declared) == sorted(lab._requests)
     for request in declared:
@@ -129,7 +137,9 @@ def test_another_branch_can_be_chosen_and_is_kept(open_lab):
     T = lab.desk.arm.fk(q)
     lab.answer("joints.set", {"q": q.tolist()})
     lab.answer("tool.target", {"T": T.ravel().tolist()})
-    other = next(b["name"] for b in states(lab)["target"]["branches"] if not b["chosen"] and b["within"])
+    other = next(
+        b["name"] for b in states(lab)["target"]["branches"] if not b["chosen"] and b["within"]
+    )
     lab.answer("tool.choose", {"branch": other})
     assert states(lab)["target"]["chosen"] == other
     T[0, 3] += 0.005
@@ -184,7 +194,10 @@ def test_four_steps_lead_from_one_frame_to_the_next(convention, open_lab):
         answer = lab.answer("table.steps", {"row": row})
         first, *_, last = (np.array(step["T"]).reshape(4, 4) for step in answer["steps"])
         assert len(answer["steps"]) == 5
-        assert np.abs(first - frames[row]).max() < 1e-12 and np.abs(last - frames[row + 1]).max() < 1e-12
+        assert (
+            np.abs(first - frames[row]).max() < 1e-12
+            and np.abs(last - frames[row + 1]).max() < 1e-12
+        )
 
 
 def test_an_impossible_entry_is_marked_and_the_last_good_arm_stands(open_lab):
@@ -248,7 +261,10 @@ def test_long_work_is_a_job_that_can_be_cancelled(open_lab):
     lab.answer("motion.plan", {"kind": "least-time", "goal": goal})
     motion = wait_for(lambda: states(lab)["motion"])
     assert motion["kind"] == "least time" and motion["excess"] is None
-    assert motion["duration"] < lab.desk.arm.quintic(lab.desk.arm.configurations["nominal"], goal["q"]).duration
+    assert (
+        motion["duration"]
+        < lab.desk.arm.quintic(lab.desk.arm.configurations["nominal"], goal["q"]).duration
+    )
     far = np.eye(4)
     far[0, 3] = 9.0
     lab.answer("motion.plan", {"kind": "line", "goal": {"T": far.ravel().tolist()}})
@@ -277,7 +293,9 @@ def test_waypoints_are_taught_and_replayed(open_lab):
 def test_a_log_of_matlab_is_a_motion(open_lab, tmp_path):
     lab = open_lab("planar2r")
     t = np.linspace(0, 1, 51)
-    savemat(tmp_path / "log.mat", {"tout": t, "q": np.degrees(np.column_stack([np.sin(t), np.cos(t)]))})
+    savemat(
+        tmp_path / "log.mat", {"tout": t, "q": np.degrees(np.column_stack([np.sin(t), np.cos(t)]))}
+    )
     content = base64.b64encode((tmp_path / "log.mat").read_bytes()).decode()
     lab.answer("motion.file", {"name": "log.mat", "content": content, "degrees": True})
     assert np.abs(np.array(states(lab)["motion"]["q"])[0] - [0, 1]).max() < 1e-9
@@ -289,13 +307,23 @@ def test_a_controller_runs_in_real_time_and_is_changed_on_the_way(open_lab):
     lab.answer("control.start", {"controller": "computed-torque", "reference": "sine"})
     wait_for(lambda: samples(lab) and len(samples(lab)[0].rows) > 30)
     lab.answer("control.push", {"link": None, "force": [0, 0, -100], "duration": 0.1})
-    lab.answer("control.change", {"controller": "pid", "payload": 2.0, "friction": "stiction", "compensate": True})
+    lab.answer(
+        "control.change",
+        {"controller": "pid", "payload": 2.0, "friction": "stiction", "compensate": True},
+    )
     wait_for(lambda: samples(lab)[0].rows[-1, 0] > 1.5)
     lab.answer("control.pause", {})
     state = states(lab)["control"]
-    assert state["running"] and state["paused"] and state["error"] is None and state["controller"] == "pid"
+    assert (
+        state["running"]
+        and state["paused"]
+        and state["error"] is None
+        and state["controller"] == "pid"
+    )
     rows = samples(lab)[0]
-    assert rows.columns[:2] == ("t", "q1") and rows.columns[-1] == "tool" and len(rows.columns) == 20
+    assert (
+        rows.columns[:2] == ("t", "q1") and rows.columns[-1] == "tool" and len(rows.columns) == 20
+    )
     assert np.all(np.diff(rows.rows[:, 0]) > 0)
     assert np.abs(rows.rows[5:30, 7:13]).max() < 1e-3  # computed torque follows
     decode_samples(rows.encoded())
@@ -410,7 +438,11 @@ BAD = {
         {"T": [1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
         {"T": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
     ],
-    "tool.pose": [{}, {"xyz": [0, 0], "euler": [0, 0, 0]}, {"xyz": [0, 0, 0], "euler": [0, 0, 0], "order": "ABC"}],
+    "tool.pose": [
+        {},
+        {"xyz": [0, 0], "euler": [0, 0, 0]},
+        {"xyz": [0, 0, 0], "euler": [0, 0, 0], "order": "ABC"},
+    ],
     "tool.jog": [
         {},
         {"axis": 6, "step": 0},
@@ -453,7 +485,11 @@ BAD = {
         {"name": "x.mat", "content": "AAAA", "columns": {"t": 1}},
         {"name": "x.csv", "content": "AAAA", "columns": {"nothing": "x"}},
     ],
-    "motion.columns": [{}, {"name": "x.csv", "content": "AAAA"}, {"name": "x.mat", "content": "AAAA"}],
+    "motion.columns": [
+        {},
+        {"name": "x.csv", "content": "AAAA"},
+        {"name": "x.mat", "content": "AAAA"},
+    ],
     "table.lock": [{}, {"free": [0, 1, 2, 3, 4, 5]}, {"free": [0.0]}],
     "table.free": [{}, {"joints": 1}],
     "obstacles.set": [{}, {"index": 0}],
@@ -475,7 +511,12 @@ BAD = {
         {"compensate": "yes"},
         {"reference": "motion"},
     ],
-    "control.push": [{}, {"force": [0, 0, 1]}, {"link": 9, "force": [0, 0, 1]}, {"force": [1e9, 0, 0]}],
+    "control.push": [
+        {},
+        {"force": [0, 0, 1]},
+        {"link": 9, "force": [0, 0, 1]},
+        {"force": [1e9, 0, 0]},
+    ],
     "control.download": [{}, {"format": "csv"}],
     "arm.planar": [{}, {"on": "yes"}],
     "no.such": [{}],
@@ -514,7 +555,10 @@ def test_gains_of_the_joints_are_tuned_typed_and_have_poles(open_lab):
     assert np.array_equal(lab._control._live.controller.kp, kp)
     lab.answer("control.gains", {"kp": [500.0, 100.0], "ki": [0.0, 0.0], "kd": kd})
     assert np.array_equal(lab._control._live.controller.kp, [500.0, 100.0])
-    assert "dhkit.PID([500.0, 100.0], [0.0, 0.0], [40.0, 10.0], limit=" in lab.answer("python", {})["text"]
+    assert (
+        "dhkit.PID([500.0, 100.0], [0.0, 0.0], [40.0, 10.0], limit="
+        in lab.answer("python", {})["text"]
+    )
     lab.answer("control.change", {"bandwidth": 12.0})  # also of the controller that runs
     assert states(lab)["control"]["gains"]["tuned"]
     assert lab._control._live.controller.kp[0] != 500.0
@@ -532,23 +576,35 @@ def test_gains_of_the_joints_are_tuned_typed_and_have_poles(open_lab):
 @pytest.mark.parametrize(("plane", "axis"), [("horizontal", 2), ("xz", 1)])
 def test_a_circle_has_the_plane_and_the_radius_that_are_asked_for(open_lab, plane, axis):
     lab = open_lab("puma560")
-    lab.answer("motion.plan", {"kind": "circle", "goal": {"plane": plane, "radius": 0.05}, "duration": 3.0})
+    lab.answer(
+        "motion.plan", {"kind": "circle", "goal": {"plane": plane, "radius": 0.05}, "duration": 3.0}
+    )
     wait_for(lambda: lab._motions.motion)
     motion = lab._motions.motion
     tool = lab.desk.arm.fk(motion.q(np.linspace(0, motion.duration, 60)))[:, :3, 3]
     assert np.ptp(tool[:, axis]) < 1e-6
-    assert np.abs(np.linalg.norm(tool - (tool.max(axis=0) + tool.min(axis=0)) / 2, axis=1) - 0.05).max() < 1e-4
+    assert (
+        np.abs(
+            np.linalg.norm(tool - (tool.max(axis=0) + tool.min(axis=0)) / 2, axis=1) - 0.05
+        ).max()
+        < 1e-4
+    )
 
 
 def test_a_circle_has_the_centre_that_is_asked_for(open_lab):
     lab = open_lab("puma560")
     position = lab.desk.arm.fk(lab.desk.q)[:3, 3]
     centre = position + np.array([-0.06, 0.02, 0.3])  # the plane is that of the tool
-    lab.answer("motion.plan", {"kind": "circle", "goal": {"plane": "horizontal", "centre": centre.tolist()}})
+    lab.answer(
+        "motion.plan",
+        {"kind": "circle", "goal": {"plane": "horizontal", "centre": centre.tolist()}},
+    )
     wait_for(lambda: lab._motions.motion)
     motion = lab._motions.motion
     tool = lab.desk.arm.fk(motion.q(np.linspace(0, motion.duration, 60)))[:, :3, 3]
-    assert np.abs(np.linalg.norm(tool[:, :2] - centre[:2], axis=1) - np.hypot(0.06, 0.02)).max() < 1e-6
+    assert (
+        np.abs(np.linalg.norm(tool[:, :2] - centre[:2], axis=1) - np.hypot(0.06, 0.02)).max() < 1e-6
+    )
 
 
 def test_a_motion_without_limits_gets_a_duration(open_lab):
@@ -566,7 +622,9 @@ def test_every_arm_begins_at_a_regular_configuration(name):
     assert np.all(q >= arm.description.numbers.lower) and np.all(q <= arm.description.numbers.upper)
 
 
-def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joints_come_back(open_lab):
+def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joints_come_back(
+    open_lab,
+):
     lab = open_lab("puma560")
     whole = lab.desk.arm
     lab.answer("table.edit", {"row": 3, "column": "d", "text": "0.5"})
@@ -591,7 +649,12 @@ def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joi
     assert lab.desk.arm.description == whole.description
     with pytest.raises(ValueError, match="no joint is locked"):
         lab.answer("table.free", {})
-    for free, complaint in (([7], "1 to 6"), ([], "0 joints move"), ("2", "numbers of joints"), ([True], "1 to 6")):
+    for free, complaint in (
+        ([7], "1 to 6"),
+        ([], "0 joints move"),
+        ("2", "numbers of joints"),
+        ([True], "1 to 6"),
+    ):
         with pytest.raises(ValueError, match=complaint):
             lab.answer("table.lock", {"free": free})
 
@@ -625,7 +688,9 @@ def test_joints_are_locked_and_freed_while_a_controller_runs(open_lab):
 
 @pytest.mark.parametrize("assumed_first", [True, False])
 def test_assumed_bodies_and_locked_joints_go_together(open_lab, assumed_first):
-    lab = open_lab(Arm.from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.25, 0), (0, 0, 0.1, "pi/2")]))
+    lab = open_lab(
+        Arm.from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.25, 0), (0, 0, 0.1, "pi/2")])
+    )
     steps = [("bodies.assume", {}), ("table.lock", {"free": [1, 2]})]
     for request, data in steps if assumed_first else reversed(steps):
         lab.answer(request, data)

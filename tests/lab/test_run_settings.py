@@ -30,8 +30,12 @@ def test_a_repeated_motion_rests_at_both_ends_and_returns():
     motion = Arm.load("planar2r").quintic([0.0, 0.0], [1.0, -0.5], 2.0)
     period = 2 * (2.0 + REST_TIME)
     for t in (0.3, 1.1):
-        there, back, again = (back_and_forth(motion, s, [1]) for s in (t, period - REST_TIME - t, t + period))
-        assert np.allclose(there[0], again[0], atol=1e-12) and np.allclose(there[0], back[0], atol=1e-12)
+        there, back, again = (
+            back_and_forth(motion, s, [1]) for s in (t, period - REST_TIME - t, t + period)
+        )
+        assert np.allclose(there[0], again[0], atol=1e-12) and np.allclose(
+            there[0], back[0], atol=1e-12
+        )
         assert np.allclose(there[1], -back[1], atol=1e-12)
     q, qd, qdd = back_and_forth(motion, 2.0 + REST_TIME / 2, [0, 1])
     assert np.allclose(q, [1.0, -0.5]) and not qd.any() and not qdd.any()

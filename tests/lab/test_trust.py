@@ -67,7 +67,9 @@ def test_what_cannot_be_followed_changes_nothing(puma):
         with pytest.raises((ValueError, dhkit.DhkitError), match="expected"):
             puma.answer(request, data)
         now = states(puma)["control"]
-        assert now["running"] and all(now[name] == before[name] for name in ("reference", "payload", "controller"))
+        assert now["running"] and all(
+            now[name] == before[name] for name in ("reference", "payload", "controller")
+        )
     assert puma.desk.running and puma._control._thread.is_alive()
 
 
@@ -182,7 +184,9 @@ def test_when_pages_cannot_be_told_the_arm_stays(puma, monkeypatch):
     assert states(puma)["table"]["rows"][1]["a"] == str(before.description.joints[1].a)
 
 
-@pytest.mark.parametrize(("typed", "value"), [("90°", np.pi / 2), ("π/2", np.pi / 2), ("0,5", 0.5), ("−1", -1.0)])
+@pytest.mark.parametrize(
+    ("typed", "value"), [("90°", np.pi / 2), ("π/2", np.pi / 2), ("0,5", 0.5), ("−1", -1.0)]
+)
 def test_entries_as_people_write_them(typed, value, puma):
     puma.answer("table.edit", {"row": 0, "column": "alpha", "text": typed})
     assert puma.desk.arm.description.numbers.alpha[0] == pytest.approx(value, abs=1e-15)
@@ -225,7 +229,9 @@ def test_what_is_not_met_is_said(open_lab):
 def test_a_branch_outside_the_limits_is_only_shown(puma):
     puma.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
     puma.answer("tool.target", {"T": puma.desk.arm.fk(puma.desk.q).ravel().tolist()})
-    outside = next(branch["name"] for branch in states(puma)["target"]["branches"] if not branch["within"])
+    outside = next(
+        branch["name"] for branch in states(puma)["target"]["branches"] if not branch["within"]
+    )
     chosen = states(puma)["target"]["chosen"]
     with pytest.raises(ValueError, match="outside the joint limits"):
         puma.answer("tool.choose", {"branch": outside})
@@ -273,7 +279,10 @@ def test_a_file_that_goes_beyond_leaves_the_last_motion(open_lab):
         content = base64.b64encode(f"t,q1,q2\n0,0,0\n1,{value},1\n2,0,0\n".encode()).decode()
         with pytest.raises((ValueError, dhkit.DhkitError)):
             lab.answer("motion.file", {"name": "x.csv", "content": content})
-        assert lab._motions.motion is before[0] and states(lab)["motion"]["duration"] == before[1]["duration"]
+        assert (
+            lab._motions.motion is before[0]
+            and states(lab)["motion"]["duration"] == before[1]["duration"]
+        )
 
 
 def test_a_file_of_huge_degree_is_refused_at_once(open_lab, tmp_path):
@@ -283,7 +292,9 @@ def test_a_file_of_huge_degree_is_refused_at_once(open_lab, tmp_path):
     file = io.BytesIO()
     np.savez_compressed(file, **(arrays | {"coefficients": np.zeros((1, 300_000, 2))}))
     with pytest.raises(ValueError, match="degree 299999"):
-        lab.answer("motion.file", {"name": "x.npz", "content": base64.b64encode(file.getvalue()).decode()})
+        lab.answer(
+            "motion.file", {"name": "x.npz", "content": base64.b64encode(file.getvalue()).decode()}
+        )
 
 
 # Copy as Python
@@ -297,7 +308,9 @@ def copied(lab, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["quintic", "trapezoidal", "line", "least-time", "spline", "through", "circle"])
+@pytest.mark.parametrize(
+    "kind", ["quintic", "trapezoidal", "line", "least-time", "spline", "through", "circle"]
+)
 def test_copied_lines_make_the_same_motion(kind, open_lab, tmp_path, monkeypatch):
     lab = open_lab("planar2r")
     lab.answer("joints.set", {"q": [0.3, 0.6]})
@@ -306,10 +319,13 @@ def test_copied_lines_make_the_same_motion(kind, open_lab, tmp_path, monkeypatch
             lab.answer("joints.set", {"q": q})
             lab.answer("waypoints.add", {})
         lab.answer(
-            "motion.plan", {"kind": "quintic" if kind == "spline" else "least-time", "goal": {"waypoints": True}}
+            "motion.plan",
+            {"kind": "quintic" if kind == "spline" else "least-time", "goal": {"waypoints": True}},
         )
     else:
-        lab.answer("motion.plan", {"kind": kind, "goal": {} if kind == "circle" else {"q": [0.7, 1.0]}})
+        lab.answer(
+            "motion.plan", {"kind": kind, "goal": {} if kind == "circle" else {"q": [0.7, 1.0]}}
+        )
     wait_for(lambda: states(lab)["motion"] or (states(lab)["job"] or {}).get("error"))
     if kind == "circle" and states(lab)["motion"] is None:
         pytest.skip("a planar arm has no circle about its own axis here")
@@ -326,7 +342,9 @@ def test_copied_lines_write_an_edited_arm(puma, tmp_path, monkeypatch):
     assert space["arm"].description == puma.desk.arm.description
 
 
-def test_copied_lines_follow_the_chosen_branch_or_iterate(puma, open_lab, tmp_path, monkeypatch, capsys):
+def test_copied_lines_follow_the_chosen_branch_or_iterate(
+    puma, open_lab, tmp_path, monkeypatch, capsys
+):
     puma.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})
     puma.answer("tool.target", {"T": puma.desk.arm.fk(puma.desk.q).ravel().tolist()})
     copied(puma, tmp_path, monkeypatch)
@@ -347,11 +365,19 @@ def test_copied_lines_simulate_what_runs(reference, locked, open_lab, tmp_path, 
     lab = open_lab("puma560" if locked else "planar2r")
     goal = lab.desk.q + 0.2
     if reference == "motion":
-        lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": goal.tolist()}, "duration": 1.0})
+        lab.answer(
+            "motion.plan", {"kind": "quintic", "goal": {"q": goal.tolist()}, "duration": 1.0}
+        )
     if locked:
         lab.answer("arm.planar", {"on": True})
     lab.answer(
-        "control.start", {"reference": reference, "controller": "pd-gravity", "bandwidth": 12.3456789, "payload": 0.3}
+        "control.start",
+        {
+            "reference": reference,
+            "controller": "pd-gravity",
+            "bandwidth": 12.3456789,
+            "payload": 0.3,
+        },
     )
     text = lab.answer("python", {})["text"]
     wanted = [held(lab, t)[0] for t in (0.0, 0.4, 0.9)]
@@ -359,7 +385,9 @@ def test_copied_lines_simulate_what_runs(reference, locked, open_lab, tmp_path, 
     assert "12.3456789" in text
     monkeypatch.chdir(tmp_path)
     space = {}
-    exec(text.replace("duration=10.0", "duration=1.0").replace("duration=5.0", "duration=1.0"), space)
+    exec(
+        text.replace("duration=10.0", "duration=1.0").replace("duration=5.0", "duration=1.0"), space
+    )
     run = space["run"]
     for t, q in zip((0.0, 0.4, 0.9), wanted, strict=True):
         assert np.abs(run.reference_q[np.searchsorted(run.t, t - 1e-9)] - q).max() < 1e-6

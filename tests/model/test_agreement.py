@@ -41,7 +41,9 @@ def central_difference(arm, q):
         ahead, behind = world_to_tool(arm, q + step), world_to_tool(arm, q - step)
         J[:3, i] = (ahead[:3, 3] - behind[:3, 3]) / (2 * STEP)
         spin = ahead[:3, :3] @ behind[:3, :3].T
-        J[3:, i] = np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / (4 * STEP)
+        J[3:, i] = np.array(
+            [spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]
+        ) / (4 * STEP)
     return J
 
 
@@ -53,7 +55,9 @@ def test_library_robots_agree_with_yourdfpy(name, law, tmp_path):
     scale = max(1.0, arm.reach)
     for frames, theirs in zip(ours, yourdfpy_frames(urdf_text(arm), tmp_path, q), strict=True):
         difference = np.abs(frames - theirs)
-        law.holds("frame positions against yourdfpy", difference[:, :3, 3].max() / scale, FRAMES, name)
+        law.holds(
+            "frame positions against yourdfpy", difference[:, :3, 3].max() / scale, FRAMES, name
+        )
         law.holds("frame rotations against yourdfpy", difference[:, :3, :3].max(), FRAMES, name)
 
 
@@ -68,7 +72,9 @@ def test_jacobians_agree_with_central_differences(name, law):
         law.holds("Jacobian against central differences", error, DIFFERENCES, name)
         qd = rng.uniform(-1, 1, arm.n)
         for frame in ("world", "tool"):
-            numeric = (jacobian(arm, q + STEP * qd, frame) - jacobian(arm, q - STEP * qd, frame)) / (2 * STEP)
+            numeric = (
+                jacobian(arm, q + STEP * qd, frame) - jacobian(arm, q - STEP * qd, frame)
+            ) / (2 * STEP)
             difference = np.abs(jacobian_dot(arm, q, qd, frame) - numeric)
             error = max(difference[:3].max() / scale, difference[3:].max())
             law.holds("Jacobian's rate against central differences", error, DIFFERENCES, name)
@@ -78,7 +84,9 @@ def test_jacobians_agree_with_central_differences(name, law):
 def test_check_urdf_accepts_the_library(name, tmp_path, check_urdf):
     for path in write_urdf(library_robot(name), tmp_path / f"{name}.urdf"):
         if path.suffix == ".urdf":
-            done = subprocess.run([check_urdf, str(path)], capture_output=True, text=True, check=False)
+            done = subprocess.run(
+                [check_urdf, str(path)], capture_output=True, text=True, check=False
+            )
             assert done.returncode == 0, done.stderr
             assert "Successfully Parsed XML" in done.stdout
 
@@ -87,14 +95,18 @@ def test_check_urdf_accepts_the_library(name, tmp_path, check_urdf):
 def test_any_table_agrees_with_pinocchio_and_yourdfpy(tmp_path, law, arm):
     law.samples(1000)
     for agreement in verify(arm, 5).agreements:
-        law.holds(f"{agreement.quantity} against Pinocchio", agreement.error, agreement.tolerance, arm)
+        law.holds(
+            f"{agreement.quantity} against Pinocchio", agreement.error, agreement.tolerance, arm
+        )
     scale = max(1.0, arm.reach)
     q = states(arm, 3)
     ours = np.concatenate([world_to_frames(arm, q), world_to_tool(arm, q)[:, None]], axis=1)
     if yourdfpy_can_read(arm):
         for frames, theirs in zip(ours, yourdfpy_frames(urdf_text(arm), tmp_path, q), strict=True):
             difference = np.abs(frames - theirs)
-            law.holds("frame positions against yourdfpy", difference[:, :3, 3].max() / scale, FRAMES, arm)
+            law.holds(
+                "frame positions against yourdfpy", difference[:, :3, 3].max() / scale, FRAMES, arm
+            )
             law.holds("frame rotations against yourdfpy", difference[:, :3, :3].max(), FRAMES, arm)
     model = pinocchio_model(arm)
     data, tool = model.createData(), model.getFrameId("tool")
@@ -103,16 +115,22 @@ def test_any_table_agrees_with_pinocchio_and_yourdfpy(tmp_path, law, arm):
         pin.computeJointJacobiansTimeVariation(model, data, state, rate)
         pin.updateFramePlacements(model, data)
         for frame, axes in (("world", pin.LOCAL_WORLD_ALIGNED), ("tool", pin.LOCAL)):
-            theirs = np.reshape(pin.getFrameJacobianTimeVariation(model, data, tool, axes), (6, arm.n))
+            theirs = np.reshape(
+                pin.getFrameJacobianTimeVariation(model, data, tool, axes), (6, arm.n)
+            )
             difference = np.abs(jacobian_dot(arm, state, rate, frame) - theirs)
-            error = max(difference[:3].max() / scale, difference[3:].max()) / (np.pi * arm.n)  # speeds add up to that
+            error = max(difference[:3].max() / scale, difference[3:].max()) / (
+                np.pi * arm.n
+            )  # speeds add up to that
             law.holds("Jacobian's rate against Pinocchio", error, JACOBIANS, arm)
 
 
 def yourdfpy_can_read(arm) -> bool:
     """Trimesh, which multiplies yourdfpy's frames, takes a transform within 1e-8 of the identity for the identity."""
     small = (*arm.numbers.sin_alpha, *arm.numbers.sin_theta, *arm.numbers.a, *arm.numbers.d)
-    placed = np.concatenate([(T - np.eye(4)).ravel() for T in (arm.numbers.T_world_base, arm.numbers.T_last_tool)])
+    placed = np.concatenate(
+        [(T - np.eye(4)).ravel() for T in (arm.numbers.T_world_base, arm.numbers.T_last_tool)]
+    )
     return not any(0 < abs(x) < 1e-7 for x in (*small, *placed))
 
 
@@ -132,14 +150,19 @@ def mass_matrix(arm, q):
                 linear[:, k] = axis
             else:
                 linear[:, k], angular[:, k] = np.cross(axis, com - point), axis
-        M += numbers.mass[i] * linear.T @ linear + angular.T @ R @ numbers.inertia[i] @ R.T @ angular
+        M += (
+            numbers.mass[i] * linear.T @ linear + angular.T @ R @ numbers.inertia[i] @ R.T @ angular
+        )
     return M
 
 
 def hold_masses(arm, count):
     model = pinocchio_model(arm)
     data = model.createData()
-    yield "total mass", abs(pin.computeTotalMass(model) - numbers_sum(arm)) / max(1.0, numbers_sum(arm))
+    yield (
+        "total mass",
+        abs(pin.computeTotalMass(model) - numbers_sum(arm)) / max(1.0, numbers_sum(arm)),
+    )
     scale = max(1.0, arm.reach)
     for q in states(arm, count):
         M = np.array(pin.crba(model, data, q, pin.Convention.WORLD))

@@ -31,16 +31,44 @@ OUTSIDE = '<!DOCTYPE x [<!ENTITY a SYSTEM "file:///etc/passwd">]>'
 DEEP = "<a>" * 20_000 + "</a>" * 20_000
 
 BAD = {
-    "truncated binary STL": ("a.stl", GOOD[:-20], r"counts 12 triangles, which need 684 \(truncated"),
+    "truncated binary STL": (
+        "a.stl",
+        GOOD[:-20],
+        r"counts 12 triangles, which need 684 \(truncated",
+    ),
     "lying count": ("a.stl", stl_header(4_000_000_000) + GOOD[84:], "counts 4000000000 triangles"),
-    "truncated, beginning with solid": ("a.stl", b"solid " + GOOD[6:-1], "truncated, or a lying count"),
+    "truncated, beginning with solid": (
+        "a.stl",
+        b"solid " + GOOD[6:-1],
+        "truncated, or a lying count",
+    ),
     "no triangles in a header": ("a.stl", stl_header(0), "no triangles"),
     "a header alone": ("a.stl", stl_header(0)[:50], "no STL"),
-    "ASCII without endsolid": ("a.stl", TEXT.rsplit("endsolid", 1)[0].encode(), "does not end in 'endsolid'"),
-    "ASCII with half a facet": ("a.stl", TEXT.replace("vertex", "vortex", 1).encode(), "12 facets with 35 vertices"),
-    "ASCII without numbers": ("a.stl", TEXT.replace("vertex", "vertex x", 1).encode(), "expected a coordinate"),
-    "ASCII with decimal commas": ("a.stl", TEXT.replace("0.5", "0,5").encode(), "decimal commas .* export 1.5 for 1,5"),
-    "ASCII with a byte order mark": ("a.stl", b"\xef\xbb\xbf" + TEXT.encode(), "byte order mark: .* without BOM"),
+    "ASCII without endsolid": (
+        "a.stl",
+        TEXT.rsplit("endsolid", 1)[0].encode(),
+        "does not end in 'endsolid'",
+    ),
+    "ASCII with half a facet": (
+        "a.stl",
+        TEXT.replace("vertex", "vortex", 1).encode(),
+        "12 facets with 35 vertices",
+    ),
+    "ASCII without numbers": (
+        "a.stl",
+        TEXT.replace("vertex", "vertex x", 1).encode(),
+        "expected a coordinate",
+    ),
+    "ASCII with decimal commas": (
+        "a.stl",
+        TEXT.replace("0.5", "0,5").encode(),
+        "decimal commas .* export 1.5 for 1,5",
+    ),
+    "ASCII with a byte order mark": (
+        "a.stl",
+        b"\xef\xbb\xbf" + TEXT.encode(),
+        "byte order mark: .* without BOM",
+    ),
     "UTF-16": ("a.stl", TEXT.encode("utf-16"), "byte order mark"),
     "ASCII with NaN": ("a.stl", ascii_stl("nan", NAN).encode(), "vertex 0 .* not finite"),
     "ASCII without facets": ("a.stl", b"solid a\nendsolid a\n", "without facets"),
@@ -48,26 +76,50 @@ BAD = {
     "empty file": ("a.stl", b"", "an empty file"),
     "NaN vertices": ("a.stl", binary_stl("nan", NAN), "vertex 0 .* not finite"),
     "infinite vertices": ("a.stl", INF, "not finite"),
-    "vertices beyond all sizes": ("a.stl", binary_stl("far", 1e30 * box().corners), "beyond 1e\\+12"),
+    "vertices beyond all sizes": (
+        "a.stl",
+        binary_stl("far", 1e30 * box().corners),
+        "beyond 1e\\+12",
+    ),
     "OBJ with bad indices": (
         "a.obj",
         b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
         "vertex 9; the file has vertices 1 to 3",
     ),
     "OBJ with index 0": ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "a face with vertex 0"),
-    "OBJ with a far negative index": ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 1 2\n", "a face with vertex -9"),
+    "OBJ with a far negative index": (
+        "a.obj",
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 1 2\n",
+        "a face with vertex -9",
+    ),
     "OBJ without faces": ("a.obj", b"v 0 0 0\nv 1 0 0\n", "no triangles"),
     "OBJ with words": ("a.obj", b"v a b c\nv 1 0 0\nf 1 2 3\n", "expected a number"),
     "OBJ with NaN": ("a.obj", b"v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", "not finite"),
     "OBJ that is none": ("a.obj", b"mtllib ../../etc/passwd\nusemtl x\n", "no line 'v x y z'"),
-    "PLY with a lying count": ("a.ply", ply(faces=99_999_999).encode(), "counts 4 vertices and 99999999 faces"),
+    "PLY with a lying count": (
+        "a.ply",
+        ply(faces=99_999_999).encode(),
+        "counts 4 vertices and 99999999 faces",
+    ),
     "PLY with a smaller lie": ("a.ply", ply(faces=5).encode(), "no PLY|lying count"),
-    "PLY with bad indices": ("a.ply", ply(content="0 0 0\n" * 4 + "3 0 1 7\n" * 4).encode(), "a face with vertex 7"),
-    "PLY with an endless count": ("a.ply", ply(faces="9" * 40).encode(), "expected 'element NAME COUNT'"),
+    "PLY with bad indices": (
+        "a.ply",
+        ply(content="0 0 0\n" * 4 + "3 0 1 7\n" * 4).encode(),
+        "a face with vertex 7",
+    ),
+    "PLY with an endless count": (
+        "a.ply",
+        ply(faces="9" * 40).encode(),
+        "expected 'element NAME COUNT'",
+    ),
     "PLY without faces": ("a.ply", ply(faces=0).encode(), "no faces"),
     "PLY that is none": ("a.ply", b"ply\nformat ascii 1.0\n", "no PLY"),
     "DAE with an entity bomb": ("a.dae", dae(before=BOMB).encode(), "document type or entities"),
-    "DAE with an external entity": ("a.dae", dae(before=OUTSIDE).encode(), "document type or entities"),
+    "DAE with an external entity": (
+        "a.dae",
+        dae(before=OUTSIDE).encode(),
+        "document type or entities",
+    ),
     "DAE in UTF-16 with a document type": (
         "a.dae",
         dae(before=BOMB).replace("?>", ' encoding="utf-16"?>').encode("utf-16"),
@@ -76,11 +128,23 @@ BAD = {
     "DAE that is not XML": ("a.dae", b"<COLLADA><a></COLLADA>", "no XML"),
     "DAE that is other XML": ("a.dae", b"<html/>", "found <html>; expected <COLLADA>"),
     "DAE cut short": ("a.dae", dae(tail="").encode(), "no XML"),
-    "DAE of depth 20,000": ("a.dae", dae(tail=DEEP + "</COLLADA>").encode(), "nested more than 64 deep"),
-    "DAE in an unknown encoding": ("a.dae", b'<?xml version="1.0" encoding="klingon"?><COLLADA/>', "no XML"),
+    "DAE of depth 20,000": (
+        "a.dae",
+        dae(tail=DEEP + "</COLLADA>").encode(),
+        "nested more than 64 deep",
+    ),
+    "DAE in an unknown encoding": (
+        "a.dae",
+        b'<?xml version="1.0" encoding="klingon"?><COLLADA/>',
+        "no XML",
+    ),
     "DAE with bad indices": ("a.dae", dae(indices="0 1 9").encode(), "a face with vertex 9"),
     "DAE with negative indices": ("a.dae", dae(indices="0 1 -3").encode(), "a face with vertex"),
-    "DAE with words for numbers": ("a.dae", dae(points="a b c 1 0 0 0 1 0").encode(), "expected a number"),
+    "DAE with words for numbers": (
+        "a.dae",
+        dae(points="a b c 1 0 0 0 1 0").encode(),
+        "expected a number",
+    ),
     "DAE with NaN": ("a.dae", dae(points="nan 0 0 1 0 0 0 1 0").encode(), "not finite"),
     "DAE with a unit of 0": ("a.dae", dae(unit="0").encode(), "<unit meter> is 0"),
     "DAE with an unknown axis": ("a.dae", dae(up="W_UP").encode(), "<up_axis> is 'W_UP'"),
@@ -133,7 +197,9 @@ def test_five_million_triangles_are_refused_from_the_header(tmp_path):
         file.write(stl_header(count))
         file.truncate(84 + 50 * count)
     start = time.process_time()
-    with pytest.raises(ModelError, match=r"5000000 triangles; expected at most 200000; .*--simplify"):
+    with pytest.raises(
+        ModelError, match=r"5000000 triangles; expected at most 200000; .*--simplify"
+    ):
         import_cad(tmp_path, one_joint(tmp_path))
     assert time.process_time() - start < 1.0
     with pytest.raises(ModelError, match="more than 50 MB"):
@@ -174,7 +240,9 @@ print(len(found.meshes[1].faces), small / float(found.description.joints[0].body
     law.size = 2 * sides**2
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
     start = time.perf_counter()
-    done = subprocess.run([sys.executable, "-c", call], capture_output=True, text=True, check=True, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-c", call], capture_output=True, text=True, check=True, timeout=300
+    )
     few, ratio, megabytes = map(float, done.stdout.split())
     assert few <= 20_000 and abs(ratio - 1) < 0.01
     law.takes("simplified, s", time.perf_counter() - start, 60)

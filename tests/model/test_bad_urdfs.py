@@ -21,7 +21,16 @@ BODY = f'<inertial><mass value="1"/>{INERTIA}</inertial>'
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 
 
-def arm(*, body=BODY, limit=LIMIT, axis='<axis xyz="0 0 1"/>', kind="revolute", origin="", inner="", more="") -> str:
+def arm(
+    *,
+    body=BODY,
+    limit=LIMIT,
+    axis='<axis xyz="0 0 1"/>',
+    kind="revolute",
+    origin="",
+    inner="",
+    more="",
+) -> str:
     """Return a URDF of two revolute joints, the second of which can be changed."""
     return (
         f'<robot name="r"><link name="a"/><link name="b">{BODY}</link><link name="c">{body}</link>'
@@ -47,18 +56,33 @@ BOMB = (
 REFUSED = {
     "entity bomb in text": (f"{BOMB}<robot>&c;</robot>", "document type or entities"),
     "entity bomb in an attribute": (f'{BOMB}<robot name="&c;"/>', "document type or entities"),
-    "external entity": ('<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>', "document type"),
-    "external DTD": ('<!DOCTYPE robot SYSTEM "http://example.org/robot.dtd"><robot/>', "document type"),
-    "depth 20,000": ("<robot>" + "<a>" * 20_000 + "</a>" * 20_000 + "</robot>", "nested more than 64 deep"),
+    "external entity": (
+        '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>',
+        "document type",
+    ),
+    "external DTD": (
+        '<!DOCTYPE robot SYSTEM "http://example.org/robot.dtd"><robot/>',
+        "document type",
+    ),
+    "depth 20,000": (
+        "<robot>" + "<a>" * 20_000 + "</a>" * 20_000 + "</robot>",
+        "nested more than 64 deep",
+    ),
     "truncated": (arm()[:300], "not well-formed XML"),
     "truncated in a tag": (arm()[:-12], "not well-formed XML"),
     "two documents": (arm() + arm(), "not well-formed XML"),
     "empty": ("", "not well-formed XML"),
     "binary": ("\x00\x01\x02", "not well-formed XML"),
     "text": ("a robot", "not well-formed XML"),
-    "xacro left in": (arm(origin='<origin xyz="${x} 0 0"/>'), "joint 'j': <origin xyz>: found '${x}'"),
+    "xacro left in": (
+        arm(origin='<origin xyz="${x} 0 0"/>'),
+        "joint 'j': <origin xyz>: found '${x}'",
+    ),
     "another format": ('<sdf version="1.6"/>', "found <sdf>; expected <robot>"),
-    "xacro": ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "has elements of xacro; run xacro on it first"),
+    "xacro": (
+        '<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>',
+        "has elements of xacro; run xacro on it first",
+    ),
     "too large": ("<robot>" + " " * BOUNDS.urdf_bytes + "</robot>", "more than 5 MB"),
     "many elements": ("<robot>" + "<a/>" * 150_000 + "</robot>", "more than 100000 elements"),
     "a long attribute": (f'<robot name="{"x" * 2000}"/>', "<robot name> has 2000 characters"),
@@ -87,39 +111,98 @@ REFUSED = {
     ),
     "two links of one name": (arm(more='<link name="b"/>'), "two links have the name 'b'"),
     "two joints of one name": (
-        arm(more='<link name="d"/><joint name="j" type="fixed"><parent link="c"/><child link="d"/></joint>'),
+        arm(
+            more='<link name="d"/><joint name="j" type="fixed"><parent link="c"/><child link="d"/></joint>'
+        ),
         "two joints have the name 'j'",
     ),
     "a link without a name": (arm(more="<link/>"), "a link has the name ''; expected text"),
-    "a name with a line break": (arm(more='<link name="a&#10;b"/>'), "a link has the name 'a\\nb'; expected text"),
+    "a name with a line break": (
+        arm(more='<link name="a&#10;b"/>'),
+        "a link has the name 'a\\nb'; expected text",
+    ),
     "no such parent": (
         arm().replace('parent link="b"', 'parent link="x"'),
         "joint 'j': <parent> is 'x', which is not a link",
     ),
-    "no child": (arm().replace('<child link="c"/>', ""), "joint 'j': <child> is '', which is not a link"),
+    "no child": (
+        arm().replace('<child link="c"/>', ""),
+        "joint 'j': <child> is '', which is not a link",
+    ),
     "unknown type": (arm(kind="hinge"), "joint 'j' is 'hinge'; expected one of revolute"),
-    "zero axis": (arm(axis='<axis xyz="0 0 0"/>'), "joint 'j': <axis xyz>: found 0 0 0; expected a direction"),
-    "axis of two numbers": (arm(axis='<axis xyz="0 1"/>'), "joint 'j': <axis xyz> has 2 numbers; expected 3"),
-    "NaN axis": (arm(axis='<axis xyz="0 nan 1"/>'), "joint 'j': <axis xyz>: found 'nan'; expected a finite number"),
-    "infinite origin": (arm(origin='<origin xyz="inf 0 0"/>'), "joint 'j': <origin xyz>: found 'inf'"),
-    "comma decimals": (arm(origin='<origin xyz="0,5 0 0"/>'), "joint 'j': <origin xyz>: found '0,5'"),
-    "underscored number": (arm(origin='<origin xyz="1_0 0 0"/>'), "found '1_0'; expected a finite number"),
-    "degrees in rpy": (arm(origin='<origin rpy="90deg 0 0"/>'), "joint 'j': <origin rpy>: found '90deg'"),
-    "limits the wrong way": (arm(limit='<limit lower="1" upper="-1"/>'), "limits [1, -1] are the wrong way round"),
-    "NaN limit": (arm(limit='<limit lower="nan" upper="1"/>'), "joint 'j': <limit lower>: found 'nan'"),
-    "negative effort": (arm(limit='<limit lower="-1" upper="1" effort="-5"/>'), "joint 'j': effort is -5"),
-    "NaN mass": (arm(body=BODY.replace('value="1"', 'value="nan"')), "link 'c': <mass value>: found 'nan'"),
-    "missing mass": (arm(body=f"<inertial>{INERTIA}</inertial>"), "link 'c': <inertial> lacks mass or inertia"),
+    "zero axis": (
+        arm(axis='<axis xyz="0 0 0"/>'),
+        "joint 'j': <axis xyz>: found 0 0 0; expected a direction",
+    ),
+    "axis of two numbers": (
+        arm(axis='<axis xyz="0 1"/>'),
+        "joint 'j': <axis xyz> has 2 numbers; expected 3",
+    ),
+    "NaN axis": (
+        arm(axis='<axis xyz="0 nan 1"/>'),
+        "joint 'j': <axis xyz>: found 'nan'; expected a finite number",
+    ),
+    "infinite origin": (
+        arm(origin='<origin xyz="inf 0 0"/>'),
+        "joint 'j': <origin xyz>: found 'inf'",
+    ),
+    "comma decimals": (
+        arm(origin='<origin xyz="0,5 0 0"/>'),
+        "joint 'j': <origin xyz>: found '0,5'",
+    ),
+    "underscored number": (
+        arm(origin='<origin xyz="1_0 0 0"/>'),
+        "found '1_0'; expected a finite number",
+    ),
+    "degrees in rpy": (
+        arm(origin='<origin rpy="90deg 0 0"/>'),
+        "joint 'j': <origin rpy>: found '90deg'",
+    ),
+    "limits the wrong way": (
+        arm(limit='<limit lower="1" upper="-1"/>'),
+        "limits [1, -1] are the wrong way round",
+    ),
+    "NaN limit": (
+        arm(limit='<limit lower="nan" upper="1"/>'),
+        "joint 'j': <limit lower>: found 'nan'",
+    ),
+    "negative effort": (
+        arm(limit='<limit lower="-1" upper="1" effort="-5"/>'),
+        "joint 'j': effort is -5",
+    ),
+    "NaN mass": (
+        arm(body=BODY.replace('value="1"', 'value="nan"')),
+        "link 'c': <mass value>: found 'nan'",
+    ),
+    "missing mass": (
+        arm(body=f"<inertial>{INERTIA}</inertial>"),
+        "link 'c': <inertial> lacks mass or inertia",
+    ),
     "missing inertia": (
         arm(body='<inertial><mass value="1"/></inertial>'),
         "link 'c': <inertial> lacks mass or inertia",
     ),
-    "missing izz": (arm(body=BODY.replace(' izz="1"', "")), "link 'c': <inertial> lacks mass or inertia"),
-    "negative mass": (arm(body=BODY.replace('value="1"', 'value="-1"')), "link 'c': mass is -1; expected none below 0"),
-    "inertia in words": (arm(body=BODY.replace('ixx="1"', 'ixx="one"')), "link 'c': <inertia ixx>: found 'one'"),
+    "missing izz": (
+        arm(body=BODY.replace(' izz="1"', "")),
+        "link 'c': <inertial> lacks mass or inertia",
+    ),
+    "negative mass": (
+        arm(body=BODY.replace('value="1"', 'value="-1"')),
+        "link 'c': mass is -1; expected none below 0",
+    ),
+    "inertia in words": (
+        arm(body=BODY.replace('ixx="1"', 'ixx="one"')),
+        "link 'c': <inertia ixx>: found 'one'",
+    ),
     "mimic in the chain": (arm(inner='<mimic joint="i"/>'), "joint 'j' follows joint 'i' (mimic)"),
-    "floating in the chain": (arm(kind="floating", limit=""), "joint 'j' is floating; expected revolute, continuous"),
-    "planar in the chain": (arm(kind="planar"), "joint 'j' is planar; expected revolute, continuous"),
+    "floating in the chain": (
+        arm(kind="floating", limit=""),
+        "joint 'j' is floating; expected revolute, continuous",
+    ),
+    "planar in the chain": (
+        arm(kind="planar"),
+        "joint 'j' is planar; expected revolute, continuous",
+    ),
 }
 
 
@@ -149,8 +232,14 @@ def test_what_is_no_file_is_not_read(path, tmp_path):
 
 
 READ = {
-    "a second root": (arm(more='<link name="z"/>'), "links that no joint connects with 'a' left out: z"),
-    "effort -1": (arm(limit='<limit lower="-1" upper="1" effort="-1" velocity="1"/>'), "effort -1; read as unlimited"),
+    "a second root": (
+        arm(more='<link name="z"/>'),
+        "links that no joint connects with 'a' left out: z",
+    ),
+    "effort -1": (
+        arm(limit='<limit lower="-1" upper="1" effort="-1" velocity="1"/>'),
+        "effort -1; read as unlimited",
+    ),
     "a finger with reversed limits": (
         arm(
             more='<link name="d"/><joint name="k" type="revolute"><parent link="c"/><child link="d"/>'
@@ -163,9 +252,18 @@ READ = {
         arm(limit='<limit lower="0" upper="0" effort="1" velocity="1"/>'),
         "limits [0, 0]; read as unlimited",
     ),
-    "limit without range": (arm(limit='<limit effort="1" velocity="1"/>'), "joint 'j': no limits; read as unlimited"),
-    "effort 0": (arm(limit='<limit lower="-1" upper="1" effort="0" velocity="1"/>'), "effort 0; read as unlimited"),
-    "non-unit axis": (arm(axis='<axis xyz="0 0 2"/>'), "joint 'j': axis has length 2; read as a direction"),
+    "limit without range": (
+        arm(limit='<limit effort="1" velocity="1"/>'),
+        "joint 'j': no limits; read as unlimited",
+    ),
+    "effort 0": (
+        arm(limit='<limit lower="-1" upper="1" effort="0" velocity="1"/>'),
+        "effort 0; read as unlimited",
+    ),
+    "non-unit axis": (
+        arm(axis='<axis xyz="0 0 2"/>'),
+        "joint 'j': axis has length 2; read as a direction",
+    ),
     "no inertial": (arm(body=""), "links without <inertial> are bodies of mass 0: c"),
     "impossible inertia": (
         arm(body=BODY.replace('ixx="1"', 'ixx="-1"')),
@@ -203,7 +301,9 @@ def test_a_link_that_the_chain_does_not_use_may_be_wrong(tmp_path):
     )
     (tmp_path / "odd.urdf").write_text(arm(more=finger))
     dropped = extract_dh(tmp_path / "odd.urdf", tip="c", side="drop")
-    assert any("<mass value>: found 'nan'" in note and "does not use it" in note for note in dropped.notes)
+    assert any(
+        "<mass value>: found 'nan'" in note and "does not use it" in note for note in dropped.notes
+    )
     with pytest.raises(ModelError, match="link 'd': <mass value>: found 'nan'"):
         extract_dh(tmp_path / "odd.urdf", tip="c")
 
@@ -223,9 +323,13 @@ def test_the_largest_tree_is_read(tmp_path):
 ENCODED = {
     "blank lines before the header": ("\n  \n" + '<?xml version="1.0"?>' + arm()).encode(),
     "utf-16": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode("utf-16"),
-    "utf-16 without a mark": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode("utf-16-le"),
+    "utf-16 without a mark": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode(
+        "utf-16-le"
+    ),
     "utf-8 that says utf-16": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode(),
-    "latin-1": ('<?xml version="1.0" encoding="ISO-8859-1"?><!-- \u00fc -->' + arm()).encode("latin-1"),
+    "latin-1": ('<?xml version="1.0" encoding="ISO-8859-1"?><!-- \u00fc -->' + arm()).encode(
+        "latin-1"
+    ),
     "gb2312": ('<?xml version="1.0" encoding="gb2312"?><!-- \u673a -->' + arm()).encode("gb2312"),
     "undeclared prefixes": arm(more='<sensor:camera a:b="c"><gazebo:x/></sensor:camera>').encode(),
     "a namespace": arm().replace("<robot ", '<robot xmlns="urn:x" xmlns:s="urn:s" ').encode(),
@@ -242,7 +346,9 @@ def test_what_other_readers_take_is_read(name, tmp_path):
 
 @pytest.mark.parametrize("encoding", ["idna", "punycode", "zlib", "rot13", "nonsense"])
 def test_encodings_that_are_none_are_refused(encoding, tmp_path):
-    (tmp_path / "arm.urdf").write_bytes(f'<?xml version="1.0" encoding="{encoding}"?>'.encode() + b"\xff" * 1000)
+    (tmp_path / "arm.urdf").write_bytes(
+        f'<?xml version="1.0" encoding="{encoding}"?>'.encode() + b"\xff" * 1000
+    )
     with pytest.raises(ModelError, match="not UTF-8 text, and"):
         read_chain(tmp_path / "arm.urdf")
 
@@ -270,7 +376,12 @@ def test_a_link_and_a_joint_may_share_a_name(tmp_path):
 
 
 def test_names_that_a_robot_file_does_not_take_are_changed(tmp_path):
-    text = arm().replace('name="i"', 'name="joint 1/a"').replace('name="j"', 'name="tool"').replace('"r"', '"7 axes"')
+    text = (
+        arm()
+        .replace('name="i"', 'name="joint 1/a"')
+        .replace('name="j"', 'name="tool"')
+        .replace('"r"', '"7 axes"')
+    )
     (tmp_path / "names.urdf").write_text(text)
     found = extract_dh(tmp_path / "names.urdf").description
     assert found.name == "robot_7_axes"
@@ -325,7 +436,10 @@ def test_meshes_outside_the_folder_are_left_out_and_said(uri, tmp_path):
 
 
 TRIANGLE = (
-    b"\0" * 80 + (1).to_bytes(4, "little") + np.array([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], "<f4").tobytes() + b"\0\0"
+    b"\0" * 80
+    + (1).to_bytes(4, "little")
+    + np.array([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0], "<f4").tobytes()
+    + b"\0\0"
 )
 
 
@@ -350,13 +464,18 @@ def test_meshes_are_found_as_yourdfpy_finds_them(uri, scale, tmp_path):
     file = root / "urdf" / "arm.urdf"
     visual = f'<visual><origin xyz="0 0 0.1"/><geometry><mesh filename="{uri}" scale="{scale}"/></geometry></visual>'
     file.write_text(arm(body=BODY + visual, origin='<origin xyz="0.3 0 0" rpy="0.4 0 0"/>'))
-    found = extract_dh(file, package_dirs=[tmp_path / "ws"] if "elsewhere" in uri else ()).description
+    found = extract_dh(
+        file, package_dirs=[tmp_path / "ws"] if "elsewhere" in uri else ()
+    ).description
     (shape,) = found.joints[1].shapes
     mesh = found.mesh_folder / shape.geometry.path
     assert mesh.read_bytes() == TRIANGLE
     assert [float(x) for x in shape.geometry.scale] == [float(x) for x in scale.split()]
 
-    names = {"package://my_robot": str(root), "package://elsewhere": str(tmp_path / "ws" / "elsewhere")}
+    names = {
+        "package://my_robot": str(root),
+        "package://elsewhere": str(tmp_path / "ws" / "elsewhere"),
+    }
 
     def handler(fname):
         for package, place in names.items():

@@ -22,7 +22,13 @@ from dhkit.model.mesh_paths import MeshFinder
 from dhkit.model.polygons import triangles_of
 from dhkit.model.shells import Shells
 from dhkit.model.solidworks_report import read_solidworks_report
-from dhkit.model.triangle_mesh import TriangleMesh, area_vectors, common_bounds, joined_meshes, unit_normals
+from dhkit.model.triangle_mesh import (
+    TriangleMesh,
+    area_vectors,
+    common_bounds,
+    joined_meshes,
+    unit_normals,
+)
 from dhkit.model.urdf_tree import ElementName, JointKind, UrdfWarning
 from mesh_shapes import box
 
@@ -66,7 +72,9 @@ def test_a_screw_moves_along_the_axis_about_which_it_rotates():
 
 @pytest.mark.parametrize("convention", Convention)
 def test_a_table_is_found_through_its_own_axes(convention):
-    arm = from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.2, 0)], convention=convention.value)
+    arm = from_dh(
+        [(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.2, 0)], convention=convention.value
+    )
     frames = world_to_frames(arm, np.zeros(3))
     carried = frames[:-1] if convention is Convention.STANDARD else frames[1:]
     axes = chain_axes(carried, carried[:, :3, 2], [False] * 3, frames[-1])
@@ -82,7 +90,9 @@ def test_numbers_and_names_fit_into_a_robot_file():
 
 
 def test_elements_of_a_urdf_are_named_in_warnings(tmp_path):
-    assert str(UrdfWarning(ElementName("joint", "elbow"), ": no limits")) == "joint 'elbow': no limits"
+    assert (
+        str(UrdfWarning(ElementName("joint", "elbow"), ": no limits")) == "joint 'elbow': no limits"
+    )
     assert f"{JointKind.PLANAR}" == "planar"
     with pytest.raises(ModelError, match="absolute path"):
         MeshFinder(tmp_path / "a.urdf").path("/etc/passwd")
@@ -96,7 +106,9 @@ def test_an_assembly_is_measured_in_the_pose_of_its_export():
     assert assembly.size == pytest.approx(2 * np.sqrt(3))
     assert assembly.axis_distances(1.0)[1, 0] == pytest.approx(0, abs=ROUNDING)
     with pytest.raises(ModelError, match="positive space"):
-        check_positions({name: TriangleMesh(box(1.0).vertices + 0.5, box(1.0).faces) for name in "ab"}, "folder")
+        check_positions(
+            {name: TriangleMesh(box(1.0).vertices + 0.5, box(1.0).faces) for name in "ab"}, "folder"
+        )
     assert CadPart("a", box(1.0)).in_metres("mm", "m").size == pytest.approx(1e-3 * np.sqrt(3))
     assert simplified(box(1.0), 1000, "box").faces is not None
     assert "g/cm^3" in StatedMasses.of(6, 2.7, None, ()).notes[0]

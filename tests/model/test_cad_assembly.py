@@ -33,14 +33,20 @@ UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
 
 def planar():
     return from_dh(
-        [(0, 0.2, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.25, 0)], name="three", order=("theta", "d", "a", "alpha")
+        [(0, 0.2, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.25, 0)],
+        name="three",
+        order=("theta", "d", "a", "alpha"),
     )
 
 
 def random_table(rng, n):
     """An arm of turning and prismatic joints with any twists, in either convention."""
     rows = np.column_stack(
-        [rng.uniform(-3, 3, n), *rng.uniform(-0.5, 0.5, (2, n)), rng.choice([0, np.pi / 2, -1.1], n)]
+        [
+            rng.uniform(-3, 3, n),
+            *rng.uniform(-0.5, 0.5, (2, n)),
+            rng.choice([0, np.pi / 2, -1.1], n),
+        ]
     )
     convention = "standard" if rng.random() < 0.5 else "modified"
     kinds = "".join(rng.choice(["R", "R", "P"], n))
@@ -87,13 +93,17 @@ def test_an_assembly_comes_back(tmp_path, law):
         frames = world_to_frames(arm, q)
         size = max(np.linalg.norm(frames[:, :3, 3], axis=1).max(), arm.reach, 1e-3)
         for i, mesh in enumerate(meshes):
-            law.holds("vertices, of the assembly's size", apart(found.meshes[i], mesh) / size, SINGLE)
+            law.holds(
+                "vertices, of the assembly's size", apart(found.meshes[i], mesh) / size, SINGLE
+            )
             # The seed's formula on what was read: (T_i^0)^-1 v.
             read = read_mesh(next(folder.glob(f"*link{i}-1.STL"))).scaled(UNITS[unit])
             columns = np.column_stack([read.corners.reshape(-1, 3), np.ones(3 * len(read.faces))]).T
             seed = (np.linalg.inv(frames[i]) @ columns).T[:, :3]
             law.holds(
-                "the seed's formula", np.abs(found.meshes[i].corners.reshape(-1, 3) - seed).max() / size, IN_MEMORY
+                "the seed's formula",
+                np.abs(found.meshes[i].corners.reshape(-1, 3) - seed).max() / size,
+                IN_MEMORY,
             )
             if i:  # integrated where the part stood in the assembly, and then moved
                 integral = shape_inertia(read, density=2700.0).moved(np.linalg.inv(frames[i]))
@@ -111,19 +121,34 @@ def test_the_pumas_own_meshes_come_back_and_its_table_stays(tmp_path):
     q = arm.numbers.configurations["ready"]
     meshes = [read_mesh(part.file) for part in link_parts(arm)]
     found = import_cad(export(tmp_path / "parts", arm, meshes, q), arm, density=2700.0)
-    assert "the configuration ready" in found.notes[1] and "unit: mm, found by size" in found.notes[2]
+    assert (
+        "the configuration ready" in found.notes[1] and "unit: mm, found by size" in found.notes[2]
+    )
     for i, mesh in enumerate(meshes):
         assert apart(found.meshes[i], mesh) < SINGLE * arm.reach
     assert [joint.a for joint in found.description.joints] == [joint.a for joint in arm.joints]
     files = found.write(tmp_path / "robot")
-    assert sorted(path.name for path in (tmp_path / "robot").iterdir()) == ["meshes", "robot.toml", "robot.urdf"]
+    assert sorted(path.name for path in (tmp_path / "robot").iterdir()) == [
+        "meshes",
+        "robot.toml",
+        "robot.urdf",
+    ]
     again = read_robot(files[0])
     assert again == found.description and again.warnings == ()
     assert again.joints[1].a.text == arm.joints[1].a.text
-    assert pinocchio_model(again).inertias[2].mass == pytest.approx(float(again.joints[1].body.mass))
+    assert pinocchio_model(again).inertias[2].mass == pytest.approx(
+        float(again.joints[1].body.mass)
+    )
     urdf = files[1].read_text()
-    assert urdf.count('filename="meshes/link3.stl"') == urdf.count('filename="meshes/link3_hull.stl"') == 1
-    with pytest.raises(ModelError, match=r"is not empty; expected a new folder; --force .* replaces an earlier import"):
+    assert (
+        urdf.count('filename="meshes/link3.stl"')
+        == urdf.count('filename="meshes/link3_hull.stl"')
+        == 1
+    )
+    with pytest.raises(
+        ModelError,
+        match=r"is not empty; expected a new folder; --force .* replaces an earlier import",
+    ):
         found.write(tmp_path / "robot")
     (tmp_path / "robot" / "meshes" / "link9.stl").write_bytes(b"of an earlier import")
     found.write(tmp_path / "robot", force=True)
@@ -135,7 +160,9 @@ def test_the_pumas_own_meshes_come_back_and_its_table_stays(tmp_path):
 def test_force_never_replaces_a_folder_with_other_files(tmp_path):
     arm = library_robot("puma560")
     meshes = [read_mesh(part.file) for part in link_parts(arm)]
-    found = import_cad(export(tmp_path / "parts", arm, meshes, arm.numbers.configurations["ready"]), arm)
+    found = import_cad(
+        export(tmp_path / "parts", arm, meshes, arm.numbers.configurations["ready"]), arm
+    )
     found.write(tmp_path / "robot")
     thesis = tmp_path / "robot" / "thesis.tex"
     thesis.write_text("three years")
@@ -146,7 +173,10 @@ def test_force_never_replaces_a_folder_with_other_files(tmp_path):
 
 def test_a_mat_file_of_faces_and_vertices_is_the_same_assembly(tmp_path):
     arm, q = planar(), np.zeros(3)
-    meshes = [mesh.moved(T).scaled(1000) for mesh, T in zip(links(arm), world_to_frames(arm, q), strict=True)]
+    meshes = [
+        mesh.moved(T).scaled(1000)
+        for mesh, T in zip(links(arm), world_to_frames(arm, q), strict=True)
+    ]
 
     def fields(mesh, suffix):
         ones = np.ones((len(mesh.vertices), 1))
@@ -158,7 +188,11 @@ def test_a_mat_file_of_faces_and_vertices_is_the_same_assembly(tmp_path):
 
     kinds = {
         "structs": {f"s{i}": fields(mesh, i) for i, mesh in enumerate(meshes, start=1)},
-        "one": {"s": {k: v for i, mesh in enumerate(meshes, start=1) for k, v in fields(mesh, i).items()}},
+        "one": {
+            "s": {
+                k: v for i, mesh in enumerate(meshes, start=1) for k, v in fields(mesh, i).items()
+            }
+        },
     }
     array = np.empty((1, 4), dtype=[(name, object) for name in "FVC"])
     for i, mesh in enumerate(meshes):
@@ -166,7 +200,8 @@ def test_a_mat_file_of_faces_and_vertices_is_the_same_assembly(tmp_path):
     kinds["array"] = {"s": array}
     words = {"F": "faces", "V": "Vertices", "C": "facevertexcdata"}
     kinds["patches"] = {
-        f"s{i}": {words[k]: v for k, v in fields(mesh, "").items()} for i, mesh in enumerate(meshes, start=1)
+        f"s{i}": {words[k]: v for k, v in fields(mesh, "").items()}
+        for i, mesh in enumerate(meshes, start=1)
     }
     for name, content in kinds.items():
         for compressed in (True, False):
@@ -215,11 +250,16 @@ def test_several_files_of_one_link_are_one_body(tmp_path):
         "".join(f"v {x} {y} {z}\n" for x, y, z in motor.vertices)
         + "".join("f {} {} {}\n".format(*(f + 1)) for f in motor.faces)
     )
-    with pytest.raises(ModelError, match=r"no single link number in motor.obj; found Assem1.*--map"):
+    with pytest.raises(
+        ModelError, match=r"no single link number in motor.obj; found Assem1.*--map"
+    ):
         import_cad(folder, arm)
     files = {3: ["Assem1 - link3-1.STL", "motor.obj"]}
     found = import_cad(folder, arm, files=files, density=1000.0)
-    body, parts = found.description.joints[2].body, [links(arm)[3], box((0.02, 0.02, 0.04), (0, 0.1, 0))]
+    body, parts = (
+        found.description.joints[2].body,
+        [links(arm)[3], box((0.02, 0.02, 0.04), (0, 0.1, 0))],
+    )
     assert len(found.meshes[3].faces) == 24
     volume = sum(shape_inertia(part, density=1.0).volume for part in parts)
     assert float(body.mass) == pytest.approx(1000 * volume, rel=1e-6)
@@ -240,13 +280,19 @@ def test_parts_in_a_wrong_place_are_warned_of(tmp_path):
     folder = export(tmp_path / "parts", arm, links(arm), q)
     assert not any(note.startswith("warning") for note in import_cad(folder, arm, q=q).notes)
     bent = import_cad(folder, arm).notes  # all joint values 0: not the pose of the export
-    assert any("link 3: its part lies" in note and "beside the axis of joint 3" in note for note in bent)
+    assert any(
+        "link 3: its part lies" in note and "beside the axis of joint 3" in note for note in bent
+    )
 
 
 def test_collada_states_its_own_unit(tmp_path):
     arm = from_dh([(0, 0, 0.3, 0)], name="one")
     mesh = box((0.3, 0.05, 0.05), (0.15, 0, 0))
-    text = dae(" ".join(map(str, (1000 * mesh.vertices).ravel())), " ".join(map(str, mesh.faces.ravel())), unit="0.001")
+    text = dae(
+        " ".join(map(str, (1000 * mesh.vertices).ravel())),
+        " ".join(map(str, mesh.faces.ravel())),
+        unit="0.001",
+    )
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "link1.dae").write_text(text)
     found = import_cad(tmp_path / "parts", arm, q=[0.0])
@@ -261,23 +307,32 @@ def collada_arm(folder, unit):
     folder.mkdir()
     for i, (mesh, T) in enumerate(zip(links(arm), world_to_frames(arm, q), strict=True)):
         points = 1000 * mesh.moved(T).vertices
-        text = dae(" ".join(map(repr, points.ravel().tolist())), " ".join(map(str, mesh.faces.ravel())), unit=unit)
+        text = dae(
+            " ".join(map(repr, points.ravel().tolist())),
+            " ".join(map(str, mesh.faces.ravel())),
+            unit=unit,
+        )
         (folder / f"link{i}.dae").write_text(text.replace('<unit meter=""/>', ""))
     return arm, links(arm)
 
 
-def test_collada_without_a_unit_is_judged_by_size_and_a_stated_unit_is_held_against_the_arm(tmp_path):
+def test_collada_without_a_unit_is_judged_by_size_and_a_stated_unit_is_held_against_the_arm(
+    tmp_path,
+):
     arm, expected = collada_arm(tmp_path / "none", "")
     found = import_cad(tmp_path / "none", arm)
     assert "unit: mm, found by size" in found.notes[2]
     assert apart(found.meshes[3], expected[3]) < IN_MEMORY
     collada_arm(tmp_path / "metres", "1")  # mm, of which the files say m
     with pytest.raises(
-        ModelError, match=r"by the unit that the files state the assembly is [0-9.]+ m across.*--unit mm"
+        ModelError,
+        match=r"by the unit that the files state the assembly is [0-9.]+ m across.*--unit mm",
     ):
         import_cad(tmp_path / "metres", arm)
     forced = import_cad(tmp_path / "metres", arm, unit="mm")
-    assert "unit: mm, as stated, for all files instead of the 1 m that files state" in forced.notes[2]
+    assert (
+        "unit: mm, as stated, for all files instead of the 1 m that files state" in forced.notes[2]
+    )
     assert apart(forced.meshes[3], expected[3]) < IN_MEMORY
     collada_arm(tmp_path / "inches", "0.0254")
     with pytest.raises(ModelError, match="state the unit of all files"):
@@ -303,16 +358,29 @@ def imported_if_clear(folder, arm):
 @pytest.mark.parametrize("unit", ["m", "cm", "mm", "in"])
 @pytest.mark.parametrize(
     ("length", "extra"),
-    [(0.1, ("base", 1.0)), (0.2, ("base", 0.8)), (0.2, ("tool", 2.0)), (0.1, ("tool", 1.0)), (0.2, ("base", 1.2))],
+    [
+        (0.1, ("base", 1.0)),
+        (0.2, ("base", 0.8)),
+        (0.2, ("tool", 2.0)),
+        (0.1, ("tool", 1.0)),
+        (0.2, ("base", 1.2)),
+    ],
 )
-def test_a_small_arm_with_a_large_base_or_tool_is_never_taken_in_a_wrong_unit(tmp_path, length, extra, unit):
+def test_a_small_arm_with_a_large_base_or_tool_is_never_taken_in_a_wrong_unit(
+    tmp_path, length, extra, unit
+):
     where, size = extra
-    for arm in (planar_small(length), from_dh([(0, 0, length / 2, 0), (0, 0, length / 2, "pi/2"), (0, 0, 0, 0)])):
+    for arm in (
+        planar_small(length),
+        from_dh([(0, 0, length / 2, 0), (0, 0, length / 2, "pi/2"), (0, 0, 0, 0)]),
+    ):
         meshes = links(arm)
         if where == "base":
             meshes[0] = box((0.3 * size, 0.3 * size, size), (0, 0, -size / 2))
         else:
-            meshes[-1] = joined_meshes([meshes[-1], box((size, 0.02, 0.02), (size / 2 - 0.01, 0, 0))])
+            meshes[-1] = joined_meshes(
+                [meshes[-1], box((size, 0.02, 0.02), (size / 2 - 0.01, 0, 0))]
+            )
         folder = export(tmp_path / f"{arm.n}", arm, meshes, np.zeros(arm.n), unit)
         with contextlib.suppress(UnitNotClearError):
             assert f"unit: {unit}," in imported_if_clear(folder, arm).notes[2]
@@ -328,7 +396,8 @@ def test_parts_moved_into_positive_space_are_recognised(tmp_path):
         corners = TriangleMesh(own.vertices - own.bounds[0], own.faces).corners
         (folder / f"link{i}.stl").write_bytes(binary_stl("x", corners))
     with pytest.raises(
-        ModelError, match=r"4 of 4 parts .* 'Do not translate STL output data to positive space' ticked"
+        ModelError,
+        match=r"4 of 4 parts .* 'Do not translate STL output data to positive space' ticked",
     ):
         import_cad(folder, arm)
 
@@ -345,7 +414,11 @@ def test_masses_from_reports_masses_and_density(tmp_path):
         f"I{k} [kg m^2]" for k in ("xx", "yy", "zz", "xy", "yz", "xz")
     )
     report = tmp_path / "masses.csv"
-    report.write_text(f"# products = -integral\n{heading}\nlink2," + ",".join(map(repr, map(float, numbers))) + "\n")
+    report.write_text(
+        f"# products = -integral\n{heading}\nlink2,"
+        + ",".join(map(repr, map(float, numbers)))
+        + "\n"
+    )
     found = import_cad(folder, arm, reports=[report], mass={3: 1.5}, density=2700.0)
     numbers = found.description.numbers
     assert numbers.mass[1:] == pytest.approx([body.mass, 1.5])
@@ -354,14 +427,19 @@ def test_masses_from_reports_masses_and_density(tmp_path):
     assert not any("outside the link" in note for note in found.notes)
     report.write_text(report.read_text().replace("link2,", "link1,"))
     elsewhere = import_cad(folder, arm, reports=[report])
-    assert any("outside the link; was the report made in the coordinates" in note for note in elsewhere.notes)
+    assert any(
+        "outside the link; was the report made in the coordinates" in note
+        for note in elsewhere.notes
+    )
 
 
 def report_of(path, link, mass, moments):
     heading = "link,mass [kg],com_x [mm],com_y [mm],com_z [mm]," + ",".join(
         f"I{k} [kg m^2]" for k in ("xx", "yy", "zz", "xy", "yz", "xz")
     )
-    path.write_text(f"{heading}\n{link},{mass},450,0,200," + ",".join(map(str, moments)) + ",0,0,0\n")
+    path.write_text(
+        f"{heading}\n{link},{mass},450,0,200," + ",".join(map(str, moments)) + ",0,0,0\n"
+    )
     return path
 
 
@@ -373,8 +451,12 @@ def test_impossible_moments_of_a_report_are_warned_of(tmp_path):
         report = report_of(tmp_path / "masses.csv", "link3", 1.0, moments)
         return import_cad(folder, arm, reports=[report]).notes[-1]
 
-    assert "warning" not in notes(0.001, 0.004, 0.004) and "the report of 'link3'" in notes(0.001, 0.004, 0.004)
-    assert "no body has its principal moments 0.001, 0.002, 0.009 kg m^2" in notes(0.001, 0.002, 0.009)
+    assert "warning" not in notes(0.001, 0.004, 0.004) and "the report of 'link3'" in notes(
+        0.001, 0.004, 0.004
+    )
+    assert "no body has its principal moments 0.001, 0.002, 0.009 kg m^2" in notes(
+        0.001, 0.002, 0.009
+    )
     assert "its largest moment is 40 kg m^2, a body of its mass" in notes(40, 40, 40)
 
 
@@ -390,7 +472,10 @@ def test_hidden_files_are_not_seen_and_parts_can_be_left_out(tmp_path):
     with pytest.raises(ModelError, match=r'--map "2=Assem1 - link2-1.STL,cover link2.stl"'):
         import_cad(folder, arm, files={-1: ["gripper.stl"]})
     found = import_cad(folder, arm, files={-1: ["gripper.stl", "cover link2.stl"]})
-    assert found.notes[0] == "parts by the numbers in their names; left out: gripper.stl, cover link2.stl"
+    assert (
+        found.notes[0]
+        == "parts by the numbers in their names; left out: gripper.stl, cover link2.stl"
+    )
     assert len(found.meshes[2].faces) == 12
 
 
@@ -400,7 +485,9 @@ def test_overlaps_and_cavities_are_found_across_the_files_of_a_link(tmp_path):
     files = {3: ["Assem1 - link3-1.STL", "second.stl"]}
 
     def with_second(mesh):
-        (folder / "second.stl").write_bytes(binary_stl("x", mesh.moved(frames[3]).scaled(1000).corners))
+        (folder / "second.stl").write_bytes(
+            binary_stl("x", mesh.moved(frames[3]).scaled(1000).corners)
+        )
         found = import_cad(folder, arm, files=files, density=1000.0)
         return float(found.description.joints[2].body.mass), found.notes[-1]
 
@@ -408,7 +495,11 @@ def test_overlaps_and_cavities_are_found_across_the_files_of_a_link(tmp_path):
     mass, note = with_second(links(arm)[3])
     assert mass == pytest.approx(2 * whole, rel=1e-5) and "counts twice" in note
     mass, note = with_second(box((0.02, 0.02, 0.02), (-0.1, 0, 0)).turned())
-    assert mass == pytest.approx(whole - 0.008, rel=1e-4) and "1 cavity inside" in note and "warning" not in note
+    assert (
+        mass == pytest.approx(whole - 0.008, rel=1e-4)
+        and "1 cavity inside" in note
+        and "warning" not in note
+    )
 
 
 def test_odd_densities_and_enormous_bodies_say_what_may_be_meant(tmp_path):
@@ -425,7 +516,10 @@ def test_odd_densities_and_enormous_bodies_say_what_may_be_meant(tmp_path):
 def test_the_pose_is_printed(tmp_path):
     arm = planar()
     folder = export(tmp_path / "parts", arm, links(arm), np.array([0.1, 0.0, -1.0]))
-    assert import_cad(folder, arm, q=[0.1, 0, -1]).notes[1] == "pose of the export: as given: q = 0.1, 0, -1"
+    assert (
+        import_cad(folder, arm, q=[0.1, 0, -1]).notes[1]
+        == "pose of the export: as given: q = 0.1, 0, -1"
+    )
 
 
 def stated(**options):
@@ -461,19 +555,31 @@ def resized(factor):
 
 REFUSED = {
     "no folder": (lambda folder, arm: import_cad(folder / "none", arm), "no such folder"),
-    "a file for a folder": (lambda folder, arm: import_cad(folder / "Assem1 - link1-1.STL", arm), "not a folder"),
+    "a file for a folder": (
+        lambda folder, arm: import_cad(folder / "Assem1 - link1-1.STL", arm),
+        "not a folder",
+    ),
     "an empty folder": (lambda folder, arm: import_cad(folder.parent, arm), "no mesh files"),
     "a missing link": (removed, "no part for link 2; found Assem1 - link0-1.STL, .*--map"),
     "a link twice": (renamed(2, "another link3.stl"), "have the same link number"),
     "a link too many": (renamed(0, "link9.stl"), "for link 9; the table has links 0 to 3"),
     "no number": (renamed(1, "shoulder.stl"), "no single link number in shoulder.stl"),
-    "a mapped file that is not there": (stated(files={1: ["none.stl"]}), "the mapping names 'none.stl'"),
-    "a mapped link that is none": (stated(files={7: ["Assem1 - link1-1.STL"]}), "the mapping names link 7"),
+    "a mapped file that is not there": (
+        stated(files={1: ["none.stl"]}),
+        "the mapping names 'none.stl'",
+    ),
+    "a mapped link that is none": (
+        stated(files={7: ["Assem1 - link1-1.STL"]}),
+        "the mapping names link 7",
+    ),
     "a file mapped twice": (
         stated(files={1: ["Assem1 - link1-1.STL"], 2: ["Assem1 - link1-1.STL"]}),
         "names 'Assem1 - link1-1.STL' twice",
     ),
-    "a link mapped and numbered": (stated(files={1: ["Assem1 - link2-1.STL"]}), "link 1 is mapped, and"),
+    "a link mapped and numbered": (
+        stated(files={1: ["Assem1 - link2-1.STL"]}),
+        "link 1 is mapped, and",
+    ),
     "a broken part": (broken, "link2-1.STL: truncated"),
     "parts a thousand times too small": (resized(1e-6), "no unit of .* fits"),
     "parts ten times too small": (resized(0.06), "cm and in fit.*state the unit"),
@@ -507,15 +613,24 @@ BOMB = 480_000_000 if ACCEPTING else 4_800_000
 TRIANGLE = {"F1": [[1, 2, 3]], "V1": np.eye(3)}
 BAD_MATS = {
     "no MAT file": (lambda path: path.write_bytes(b"x" * 500), "no .mat file of format 5"),
-    "HDF5": (lambda path: path.write_bytes(b"MATLAB 7.3 MAT-file" + b" " * 493 + b"\x89HDF\r\n\x1a\n"), "format 7.3"),
+    "HDF5": (
+        lambda path: path.write_bytes(b"MATLAB 7.3 MAT-file" + b" " * 493 + b"\x89HDF\r\n\x1a\n"),
+        "format 7.3",
+    ),
     "empty": (lambda path: path.write_bytes(b""), "no .mat file of format 5"),
     "no structs": (cell(x=np.eye(3)), "no struct with fields F, V"),
-    "faces of nothing": (cell(s1=TRIANGLE | {"F1": [[1, 2, 4]]}), "a face with a vertex that is none of 1 to 3"),
+    "faces of nothing": (
+        cell(s1=TRIANGLE | {"F1": [[1, 2, 4]]}),
+        "a face with a vertex that is none of 1 to 3",
+    ),
     "index 0": (cell(s1=TRIANGLE | {"F1": [[0, 1, 2]]}), "none of 1 to 3"),
     "half an index": (cell(s1=TRIANGLE | {"F1": [[1, 2, 2.5]]}), "not whole numbers"),
     "NaN": (cell(s1=TRIANGLE | {"V1": np.full((3, 3), np.nan)}), "not finite"),
     "words": (cell(s1=TRIANGLE | {"V1": "vertices"}), "not a matrix of real numbers"),
-    "cells": (cell(s1=TRIANGLE | {"V1": np.array([[1, "a"]], dtype=object)}), "not a matrix of real numbers"),
+    "cells": (
+        cell(s1=TRIANGLE | {"V1": np.array([[1, "a"]], dtype=object)}),
+        "not a matrix of real numbers",
+    ),
     "complex": (cell(s1=TRIANGLE | {"V1": 1j * np.eye(3)}), "not a matrix of real numbers"),
     "two parts of one name": (
         cell(s=TRIANGLE | {"F2": [[1, 2, 3]], "V2": np.eye(3)}, s1=TRIANGLE),
@@ -523,7 +638,9 @@ BAD_MATS = {
     ),
     "flat vertices": (cell(s1=TRIANGLE | {"V1": np.eye(2)}), r"shape \(2, 2\)"),
     "a bomb": (
-        lambda path: savemat(path, {"s1": {"V1": np.zeros((BOMB // 8000, 1000))}}, do_compression=True),
+        lambda path: savemat(
+            path, {"s1": {"V1": np.zeros((BOMB // 8000, 1000))}}, do_compression=True
+        ),
         "unpacks to more than",
     ),
 }
@@ -549,7 +666,9 @@ def test_damaged_mat_files_never_crash(tmp_path):
         savemat(path, {"s1": TRIANGLE}, do_compression=compressed)
         whole = path.read_bytes()
         for k in range(150):
-            content = bytearray(whole[: int(rng.integers(130, len(whole)))] if k % 3 == 0 else whole)
+            content = bytearray(
+                whole[: int(rng.integers(130, len(whole)))] if k % 3 == 0 else whole
+            )
             for at in rng.integers(128, len(content), 3):
                 content[at] = int(rng.integers(256))
             path.write_bytes(bytes(content))
@@ -570,7 +689,9 @@ def test_nothing_is_written_half(tmp_path, monkeypatch):
 
 def test_round_parts_are_drawn_and_weighed(tmp_path):
     arm = from_dh([(0, 0.4, 0, 0)], name="one")
-    folder = export(tmp_path / "parts", arm, [prism(32, 0.1, 0.1), sphere(12, 16, 0.2)], np.zeros(1))
+    folder = export(
+        tmp_path / "parts", arm, [prism(32, 0.1, 0.1), sphere(12, 16, 0.2)], np.zeros(1)
+    )
     found = import_cad(folder, arm, density=1000.0, simplify=60)
     assert len(found.meshes[1].faces) <= 60 and len(found.meshes[0].faces) <= 60
     whole = shape_inertia(sphere(12, 16, 0.2), density=1000.0)

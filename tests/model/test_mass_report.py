@@ -17,7 +17,9 @@ SIGNS = (1, -1)
 
 def body(seed=3):
     rng = np.random.default_rng(seed)
-    return shape_inertia(box((0.1, 0.25, 0.4), (0.03, -0.02, 0.05)).moved(pose(rng)), density=2700.0)
+    return shape_inertia(
+        box((0.1, 0.25, 0.4), (0.03, -0.02, 0.05)).moved(pose(rng)), density=2700.0
+    )
 
 
 def csv_text(found, units=("g", "mm"), sign="-", digits=17, separator=","):
@@ -33,16 +35,28 @@ def csv_text(found, units=("g", "mm"), sign="-", digits=17, separator=","):
     ]
     names = ["mass", "com_x", "com_y", "com_z", "Ixx", "Iyy", "Izz", "Ixy", "Iyz", "Ixz"]
     brackets = [mass_unit, *[length_unit] * 3, *[f"{mass_unit} {length_unit}^2"] * 6]
-    heading = separator.join(["link", *(f"{name} [{unit}]" for name, unit in zip(names, brackets, strict=True))])
+    heading = separator.join(
+        ["link", *(f"{name} [{unit}]" for name, unit in zip(names, brackets, strict=True))]
+    )
     row = separator.join(["link2", *(f"{x:.{digits}g}" for x in numbers)])
     return f"# products = {sign}integral\n{heading}\n{row}\n"
 
 
 def solidworks_text(
-    found, sign=1, digits=17, *, principal=True, origin=True, notation="", units=("grams", "millimeters")
+    found,
+    sign=1,
+    digits=17,
+    *,
+    principal=True,
+    origin=True,
+    notation="",
+    units=("grams", "millimeters"),
 ):
     """SolidWorks' text; sign +1: its products are +integral, the default."""
-    mass, length = {"grams": 1e3, "kilograms": 1.0}[units[0]], {"millimeters": 1e3, "meters": 1.0}[units[1]]
+    mass, length = (
+        {"grams": 1e3, "kilograms": 1.0}[units[0]],
+        {"millimeters": 1e3, "meters": 1.0}[units[1]],
+    )
     moment = mass * length**2
     diagonal = np.eye(3, dtype=bool)
 
@@ -74,15 +88,20 @@ Center of mass: ( {units[1]} )
 \tZ = {com[2] * length:.{digits}g}
 """
     if principal:
-        text += f"\nPrincipal axes of inertia and principal {heading}\nTaken at the center of mass.\n" + "".join(
-            f"\t I{axis} = ({v[0]:.6f}, {v[1]:.6f}, {v[2]:.6f})   \tP{axis} = {moment * p:.{digits}g}\n"
-            for axis, v, p in zip("xyz", vectors.T, values, strict=True)
+        text += (
+            f"\nPrincipal axes of inertia and principal {heading}\nTaken at the center of mass.\n"
+            + "".join(
+                f"\t I{axis} = ({v[0]:.6f}, {v[1]:.6f}, {v[2]:.6f})   \tP{axis} = {moment * p:.{digits}g}\n"
+                for axis, v, p in zip("xyz", vectors.T, values, strict=True)
+            )
         )
     text += f"\nM{heading[1:]}\nTaken at the center of mass and aligned with the output coordinate system.{notation}\n"
     text += listed("L", inertia) + "\n"
     if origin:
         text += (
-            f"\nM{heading[1:]}\nTaken at the output coordinate system.{notation}\n" + listed("I", about_origin) + "\n"
+            f"\nM{heading[1:]}\nTaken at the output coordinate system.{notation}\n"
+            + listed("I", about_origin)
+            + "\n"
         )
     return text
 
@@ -116,12 +135,18 @@ def test_a_report_is_the_body_integrated(tmp_path, law):
                 assert "found by" in report.notes[1]
         T = pose(np.random.default_rng(seed))
         seen = read(tmp_path, solidworks_text(found.moved(T)))
-        law.holds("moved into its frame, relative", difference(seen.properties.moved(np.linalg.inv(T)), found), AGREES)
+        law.holds(
+            "moved into its frame, relative",
+            difference(seen.properties.moved(np.linalg.inv(T)), found),
+            AGREES,
+        )
 
 
 @pytest.mark.parametrize("sign", SIGNS)
 @pytest.mark.parametrize(("principal", "origin"), [(True, False), (False, True), (True, True)])
-def test_the_sign_of_products_is_found_by_either_block_with_rounded_numbers(tmp_path, sign, principal, origin):
+def test_the_sign_of_products_is_found_by_either_block_with_rounded_numbers(
+    tmp_path, sign, principal, origin
+):
     found = body()
     report = read(tmp_path, solidworks_text(found, sign, 7, principal=principal, origin=origin))
     assert difference(report.properties, found) < 1e-5
@@ -132,7 +157,11 @@ def test_the_sign_of_products_is_found_by_either_block_with_rounded_numbers(tmp_
 @pytest.mark.parametrize("sign", SIGNS)
 def test_two_decimal_places_as_solidworks_prints_them(tmp_path, sign):
     found = body()
-    text = re.sub(r"(= )(-?\d+\.?\d*(?:e-?\d+)?)", lambda m: f"{m[1]}{float(m[2]):.2f}", solidworks_text(found, sign))
+    text = re.sub(
+        r"(= )(-?\d+\.?\d*(?:e-?\d+)?)",
+        lambda m: f"{m[1]}{float(m[2]):.2f}",
+        solidworks_text(found, sign),
+    )
     report = read(tmp_path, text)
     assert difference(report.properties, found) < 1e-4
     assert ("+integral" if sign == 1 else "entries of the tensor") in report.notes[1]
@@ -152,12 +181,18 @@ def test_masses_and_centres_with_too_few_digits_are_refused_or_warned_of(tmp_pat
     def with_numbers(mass, x):
         changed = re.sub(r"Mass = \S+", f"Mass = {mass}", text)
         return re.sub(
-            r"\tX = \S+", f"\tX = {x}", re.sub(r"(?s)\nMoments of inertia[^M]*\nTaken at the output.*", "", changed)
+            r"\tX = \S+",
+            f"\tX = {x}",
+            re.sub(r"(?s)\nMoments of inertia[^M]*\nTaken at the output.*", "", changed),
         )
 
-    with pytest.raises(ModelError, match=r"line 7: its mass has too few digits, 50 %; choose smaller units or more"):
+    with pytest.raises(
+        ModelError, match=r"line 7: its mass has too few digits, 50 %; choose smaller units or more"
+    ):
         read(tmp_path, with_numbers("0.01", 0.03))
-    with pytest.raises(ModelError, match=r"its centre of mass has too few digits, \d+ % of its radius of gyration"):
+    with pytest.raises(
+        ModelError, match=r"its centre of mass has too few digits, \d+ % of its radius of gyration"
+    ):
         read(tmp_path, with_numbers("27.0000", "0.0"))
     rounded = read(tmp_path, with_numbers("27.0", "0.030"))
     assert "warning: its mass is rounded to 0.2 %" in rounded.notes
@@ -165,10 +200,16 @@ def test_masses_and_centres_with_too_few_digits_are_refused_or_warned_of(tmp_pat
 
 
 @pytest.mark.parametrize(
-    "title", ["Mass properties of robot.SLDASM", "Mass properties of robot\n( Assembly Configuration - Default )"]
+    "title",
+    [
+        "Mass properties of robot.SLDASM",
+        "Mass properties of robot\n( Assembly Configuration - Default )",
+    ],
 )
 def test_a_report_of_an_assembly_is_refused(tmp_path, title):
-    with pytest.raises(ModelError, match=r"line [12]: a report of an assembly; expected one of the part of a link"):
+    with pytest.raises(
+        ModelError, match=r"line [12]: a report of an assembly; expected one of the part of a link"
+    ):
         read(tmp_path, solidworks_text(body()).replace("Mass properties of Part2", title))
 
 
@@ -177,8 +218,12 @@ def test_without_other_blocks_the_stated_notation_or_the_default_counts(tmp_path
     default = read(tmp_path, solidworks_text(found, 1, principal=False, origin=False))
     assert "default" in default.notes[1] and difference(default.properties, found) < AGREES
     negative = " (Using negative tensor notation.)"
-    stated = read(tmp_path, solidworks_text(found, -1, principal=False, origin=False, notation=negative))
-    assert "as the report states" in stated.notes[1] and difference(stated.properties, found) < AGREES
+    stated = read(
+        tmp_path, solidworks_text(found, -1, principal=False, origin=False, notation=negative)
+    )
+    assert (
+        "as the report states" in stated.notes[1] and difference(stated.properties, found) < AGREES
+    )
 
 
 def test_several_parts_in_one_file(tmp_path):
@@ -195,10 +240,18 @@ TABLE = csv_text(body())
 BAD = {
     "empty": ("a.txt", "", "expected a line 'Mass"),
     "another language": ("a.txt", GOOD.replace("Mass =", "Masse ="), "in English"),
-    "decimal commas": ("a.txt", GOOD.replace("Mass = 27000", "Mass = 27,000"), "line 7.*decimal commas"),
+    "decimal commas": (
+        "a.txt",
+        GOOD.replace("Mass = 27000", "Mass = 27,000"),
+        "line 7.*decimal commas",
+    ),
     "no mass": ("a.txt", re.sub("Mass = [0-9.]+", "Mass = 0", GOOD), "mass is 0"),
     "an unknown unit": ("a.txt", GOOD.replace("( grams *", "( slugs *"), "unit 'slugs'"),
-    "half a unit": ("a.txt", GOOD.replace("( grams *  square millimeters )", "( grams )"), "the unit 'grams'"),
+    "half a unit": (
+        "a.txt",
+        GOOD.replace("( grams *  square millimeters )", "( grams )"),
+        "the unit 'grams'",
+    ),
     "an unknown length": (
         "a.txt",
         GOOD.replace("Center of mass: ( millimeters )", "Center of mass: ( furlongs )"),
@@ -214,8 +267,16 @@ BAD = {
     "an unknown column": ("a.csv", TABLE.replace("com_x [mm]", "centre [mm]"), "column 'centre"),
     "a missing column": ("a.csv", "link,mass [kg]\n1,2\n", "no column com_x"),
     "products without a sign": ("a.csv", TABLE.split("\n", 1)[1], "without their sign"),
-    "a table with decimal commas": ("a.csv", csv_text(body(), separator=";").replace(".", ","), "decimal commas"),
-    "too many entries": ("a.csv", TABLE.rstrip() + ",1\n", "12 entries; expected 11; decimal commas"),
+    "a table with decimal commas": (
+        "a.csv",
+        csv_text(body(), separator=";").replace(".", ","),
+        "decimal commas",
+    ),
+    "too many entries": (
+        "a.csv",
+        TABLE.rstrip() + ",1\n",
+        "12 entries; expected 11; decimal commas",
+    ),
     "an expression": ("a.csv", TABLE.replace("link2,", "link2,1+"), "expected a number"),
     "NaN": ("a.csv", TABLE.replace("link2,", "link2,nan"), "expected a number"),
     "a negative mass": ("a.csv", TABLE.replace("link2,", "link2,-"), "expected a positive number"),

@@ -37,7 +37,8 @@ def test_all_formats_give_the_same_triangles(tmp_path):
         "a.obj": obj(mesh).encode(),
         "a.ply": trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(file_type="ply"),
         "a.dae": dae(
-            " ".join(f"{x:.9g}" for x in mesh.vertices.ravel()), " ".join(map(str, mesh.faces.ravel()))
+            " ".join(f"{x:.9g}" for x in mesh.vertices.ravel()),
+            " ".join(map(str, mesh.faces.ravel())),
         ).encode(),
     }
     formats = ["stl", "stl_ascii", "obj", "ply", "dae"]
@@ -104,7 +105,9 @@ def test_concave_polygons_keep_their_area_and_their_side(tmp_path, first):
     old = whole[whole.index("<triangles") : whole.index("</triangles>") + len("</triangles>")]
     vertex = '<input semantic="VERTEX" source="#v" offset="0"/>'
     lists = f'<polylist count="2" material="paint">{vertex}<vcount>4 6</vcount><p>6 7 8 9 0 1 2 3 4 5</p></polylist>'
-    loose = f'<polygons count="2" material="paint">{vertex}<p>6 7 8 9</p><p>0 1 2 3 4 5</p></polygons>'
+    loose = (
+        f'<polygons count="2" material="paint">{vertex}<p>6 7 8 9</p><p>0 1 2 3 4 5</p></polygons>'
+    )
     (tmp_path / "a.dae").write_text(whole.replace(old, lists))
     (tmp_path / "b.dae").write_text(whole.replace(old, loose))
     for name in ("a.obj", "a.dae", "b.dae"):
@@ -152,11 +155,14 @@ def test_arrays_of_other_shapes_are_no_mesh():
     with pytest.raises(ValueError, match="vertices has shape"):
         TriangleMesh(np.zeros((3, 2)), np.zeros((1, 3), dtype=int))
     with pytest.raises(ValueError, match="colours has shape"):
-        TriangleMesh(np.zeros((3, 3)), np.zeros((1, 3), dtype=int), np.zeros((2, 3), dtype=np.uint8))
+        TriangleMesh(
+            np.zeros((3, 3)), np.zeros((1, 3), dtype=int), np.zeros((2, 3), dtype=np.uint8)
+        )
 
 
 TRIANGLE = (
-    "solid {name}\nfacet normal 0 0 1\n outer loop\n vertex {x} 0 0\n vertex 1 0 0\n vertex 0 1 0\n endloop\nendfacet\n"
+    "solid {name}\nfacet normal 0 0 1\n outer loop\n"
+    " vertex {x} 0 0\n vertex 1 0 0\n vertex 0 1 0\n endloop\nendfacet\n"
 )
 
 

@@ -25,7 +25,11 @@ def moments(mass, size):
     return mass / 12 * np.diag([y + z, x + z, x + y])
 
 
-@given(st.tuples(*[st.floats(0.05, 3.0)] * 3), st.floats(0.5, 9000.0), st.tuples(*[st.floats(-5, 5)] * 3))
+@given(
+    st.tuples(*[st.floats(0.05, 3.0)] * 3),
+    st.floats(0.5, 9000.0),
+    st.tuples(*[st.floats(-5, 5)] * 3),
+)
 def test_a_box_is_exact(size, density, centre):
     found = shape_inertia(box(size, centre), density=density)
     mass = density * np.prod(size)
@@ -43,7 +47,9 @@ def test_balls_and_cylinders_are_right_to_their_meshes():
     n, r, h = 96, 0.7, 1.3
     found = shape_inertia(prism(n, r, h), density=2.0)
     area = n / 2 * r**2 * np.sin(2 * np.pi / n)
-    about_axis = found.mass * r**2 / 6 * (2 + np.cos(2 * np.pi / n))  # of a regular polygon with n corners
+    about_axis = (
+        found.mass * r**2 / 6 * (2 + np.cos(2 * np.pi / n))
+    )  # of a regular polygon with n corners
     assert found.mass == pytest.approx(2 * area * h, rel=EXACT * 10)
     assert found.inertia[2, 2] == pytest.approx(about_axis, rel=1e-13)
     assert found.inertia[0, 0] == pytest.approx(about_axis / 2 + found.mass * h**2 / 12, rel=1e-13)
@@ -57,21 +63,33 @@ def test_it_turns_moves_and_grows_with_the_mesh(law):
             pose(rng),
             10 ** rng.uniform(-9, 6),
         )
-        one, other = shape_inertia(mesh, density=1.0).moved(T), shape_inertia(mesh.moved(T), density=1.0)
+        one, other = (
+            shape_inertia(mesh, density=1.0).moved(T),
+            shape_inertia(mesh.moved(T), density=1.0),
+        )
         law.holds("centre of mass, m", np.abs(one.com - other.com).max(), INVARIANT)
-        law.holds("inertia, relative", np.abs(one.inertia - other.inertia).max() / np.abs(one.inertia).max(), INVARIANT)
+        law.holds(
+            "inertia, relative",
+            np.abs(one.inertia - other.inertia).max() / np.abs(one.inertia).max(),
+            INVARIANT,
+        )
         grown = shape_inertia(mesh.scaled(scale), density=1.0)
         plain = shape_inertia(mesh, density=1.0)
         law.holds("scaled mass, relative", abs(grown.mass / plain.mass / scale**3 - 1), INVARIANT)
         law.holds(
-            "scaled inertia, relative", np.abs(grown.inertia / scale**5 - plain.inertia).max() / plain.mass, INVARIANT
+            "scaled inertia, relative",
+            np.abs(grown.inertia / scale**5 - plain.inertia).max() / plain.mass,
+            INVARIANT,
         )
 
 
 def test_a_mirrored_mesh_is_a_mirrored_body():
     mesh = box((1, 2, 3), (0.3, 0.4, 0.5)).moved(pose(np.random.default_rng(0)))
     mirror = np.diag([1.0, -1.0, 1.0])
-    plain, mirrored = shape_inertia(mesh, mass=2.0), shape_inertia(mesh.scaled([1, -1, 1]), mass=2.0)
+    plain, mirrored = (
+        shape_inertia(mesh, mass=2.0),
+        shape_inertia(mesh.scaled([1, -1, 1]), mass=2.0),
+    )
     assert mirrored.notes == ()
     assert mirrored.com == pytest.approx(mirror @ plain.com, abs=INVARIANT)
     assert mirrored.inertia == pytest.approx(mirror @ plain.inertia @ mirror, abs=INVARIANT)
@@ -126,13 +144,19 @@ def test_shells_that_share_volume_are_warned_of_with_its_share():
             crossed = shape_inertia([mesh.scaled(scale) for mesh in meshes], density=1.0)
             assert len(crossed.notes) == 1
             assert "where the material counts twice (0.5 % of the volume)" in crossed.notes[0]
-    raised = other.moved(np.block([[np.eye(3), np.array([[0], [0], [0.1]])], [np.zeros(3), np.ones(1)]]))
+    raised = other.moved(
+        np.block([[np.eye(3), np.array([[0], [0], [0.1]])], [np.zeros(3), np.ones(1)]])
+    )
     assert shape_inertia([one, raised], density=1.0).notes == ()  # they touch
 
 
 def test_parts_of_one_body_are_judged_together():
     twice = shape_inertia([box(), box()], density=1.0)
-    assert twice.mass == pytest.approx(12.0) and "2 of 2 shells" in twice.notes[0] and "50 %" in twice.notes[0]
+    assert (
+        twice.mass == pytest.approx(12.0)
+        and "2 of 2 shells" in twice.notes[0]
+        and "50 %" in twice.notes[0]
+    )
     end = shape_inertia([box((4, 1, 1)), box((1, 1, 1), (2, 0.3, 0))], density=1.0)
     assert "counts twice" in end.notes[0]
     within = shape_inertia([box((0.2, 0.2, 0.2)), box()], density=1.0)
@@ -154,44 +178,76 @@ def test_triangles_written_twice_count_once():
     one_more = np.concatenate([mesh.faces, mesh.faces[3:4]])
     one_back = np.concatenate([mesh.faces, mesh.faces[3:4, ::-1]])
     for faces, dropped in ((doubled, 12), (both_ways, 12), (one_more, 1), (one_back, 1)):
-        for made in (TriangleMesh(mesh.vertices, faces), TriangleMesh.of_corners(mesh.vertices[faces])):
+        for made in (
+            TriangleMesh(mesh.vertices, faces),
+            TriangleMesh.of_corners(mesh.vertices[faces]),
+        ):
             found = shape_inertia(made, density=1.0)
             assert found.method is InertiaMethod.CLOSED and found.mass == pytest.approx(6.0)
-            assert f"{dropped} triangle" in found.notes[0] and "written more than once" in found.notes[0]
+            assert (
+                f"{dropped} triangle" in found.notes[0]
+                and "written more than once" in found.notes[0]
+            )
 
 
 def test_cavities_that_touch_stay_and_one_that_reaches_out_is_warned_of():
     block = box((6, 6, 6))
     first, second = box((1, 1, 1), (-0.5, 0, 0)).turned(), box((1, 1, 1), (0.5, 0, 0)).turned()
-    for cavities in ((first, second), (second, first), (first.scaled(1.0), box((1, 2, 1), (0.5, 0, 0)).turned())):
+    for cavities in (
+        (first, second),
+        (second, first),
+        (first.scaled(1.0), box((1, 2, 1), (0.5, 0, 0)).turned()),
+    ):
         found = shape_inertia(joined_meshes([block, *cavities]), density=1.0)
         lacking = sum(abs(shape_inertia(cavity, density=1.0).volume) for cavity in cavities)
         assert found.mass == pytest.approx(216 - lacking) and found.notes == ("2 cavities inside",)
-    poking = shape_inertia(joined_meshes([block, box((1, 1, 1), (2.9, 0, 0)).turned()]), density=1.0)
-    assert poking.notes[0] == "1 cavity inside" and "a cavity reaches out of the material" in poking.notes[1]
-    island = shape_inertia(joined_meshes([block, box((4, 4, 4)).turned(), box((2, 2, 2))]), density=1.0)
+    poking = shape_inertia(
+        joined_meshes([block, box((1, 1, 1), (2.9, 0, 0)).turned()]), density=1.0
+    )
+    assert (
+        poking.notes[0] == "1 cavity inside"
+        and "a cavity reaches out of the material" in poking.notes[1]
+    )
+    island = shape_inertia(
+        joined_meshes([block, box((4, 4, 4)).turned(), box((2, 2, 2))]), density=1.0
+    )
     assert island.mass == pytest.approx(216 - 64 + 8) and island.notes == ("1 cavity inside",)
-    touching = shape_inertia(joined_meshes([block, box((2, 2, 2), (4, 0, 0)).turned()]), density=1.0)
-    assert touching.mass == pytest.approx(224) and "1 of 2 shells were inside out" in touching.notes[0]
+    touching = shape_inertia(
+        joined_meshes([block, box((2, 2, 2), (4, 0, 0)).turned()]), density=1.0
+    )
+    assert (
+        touching.mass == pytest.approx(224) and "1 of 2 shells were inside out" in touching.notes[0]
+    )
 
 
 def test_only_a_mesh_that_is_turned_as_a_whole_is_called_inside_out():
     large, small = box((2, 2, 2)).turned(), box((1, 1, 1), (9, 0, 0))
     found = shape_inertia(joined_meshes([large, small]), density=1.0)
-    assert found.mass == pytest.approx(9.0) and found.notes == ("1 of 2 shells were inside out and were turned",)
-    three = shape_inertia(joined_meshes([box(), small.turned(), box((0.5, 0.5, 0.5), (9, 0, 0))]), density=1.0)
-    assert "1 of 3 shells were inside out" in three.notes[0] and "1 of 3 shells lie in" in three.notes[1]
+    assert found.mass == pytest.approx(9.0) and found.notes == (
+        "1 of 2 shells were inside out and were turned",
+    )
+    three = shape_inertia(
+        joined_meshes([box(), small.turned(), box((0.5, 0.5, 0.5), (9, 0, 0))]), density=1.0
+    )
+    assert (
+        "1 of 3 shells were inside out" in three.notes[0]
+        and "1 of 3 shells lie in" in three.notes[1]
+    )
     both = shape_inertia(joined_meshes([large, small.turned()]), density=1.0)
     assert both.notes == ("inside out: all triangles were turned",)
 
 
-@pytest.mark.parametrize("place", [lambda k: (2 * k, 0, 0), slow_if(True, lambda k: (0.8 * k, 0.8 * k, 0.8 * k))])
+@pytest.mark.parametrize(
+    "place", [lambda k: (2 * k, 0, 0), slow_if(True, lambda k: (0.8 * k, 0.8 * k, 0.8 * k))]
+)
 def test_hundreds_of_shells_take_little_time(place, law):
     balls = joined_meshes([sphere(12, 16, 0.6).moved(shifted(place(k))) for k in range(250)])
     start = time.process_time()
     found = shape_inertia(balls, density=1.0)
     law.takes("250 shells, s", time.process_time() - start, 2)
-    assert found.notes == () and found.mass == pytest.approx(250 * shape_inertia(sphere(12, 16, 0.6), density=1.0).mass)
+    assert found.notes == () and found.mass == pytest.approx(
+        250 * shape_inertia(sphere(12, 16, 0.6), density=1.0).mass
+    )
 
 
 def shifted(centre):
@@ -240,7 +296,12 @@ def test_nothing_is_assumed(stated, complaint):
         box().scaled([1, 1, 0]),
         TriangleMesh(np.zeros((3, 3)), np.array([[0, 1, 2]])),
         TriangleMesh(np.eye(3), np.array([[0, 1, 2]])),
-        joined_meshes([TriangleMesh(np.eye(3), np.array([[0, 1, 2]])), TriangleMesh(np.eye(3), np.array([[0, 2, 1]]))]),
+        joined_meshes(
+            [
+                TriangleMesh(np.eye(3), np.array([[0, 1, 2]])),
+                TriangleMesh(np.eye(3), np.array([[0, 2, 1]])),
+            ]
+        ),
     ],
 )
 def test_what_has_no_volume_is_refused(mesh):
@@ -252,7 +313,9 @@ def test_a_body_reads_back():
     found = shape_inertia(box((0.1, 0.2, 0.3), (0.01, 0, 0)), density=2700.0)
     body = found.body("beam")
     assert float(body.mass) == found.mass and body.name == "beam"
-    assert np.array([[float(x) for x in row] for row in body.inertia.rows]) == pytest.approx(found.inertia)
+    assert np.array([[float(x) for x in row] for row in body.inertia.rows]) == pytest.approx(
+        found.inertia
+    )
 
 
 def test_a_hull_is_closed_and_outwards():
@@ -273,7 +336,9 @@ def test_walls_that_two_bodies_share_are_no_duplicates():
     whole, half = block(80), block(40)
     top = int(np.argmax(whole.triangles_center[:, 0]))
     faces = np.vstack([np.delete(whole.faces, top, axis=0), half.faces + len(whole.vertices)])
-    found = shape_inertia(TriangleMesh(np.vstack([whole.vertices, half.vertices]), faces), density=1.0)
+    found = shape_inertia(
+        TriangleMesh(np.vstack([whole.vertices, half.vertices]), faces), density=1.0
+    )
     assert found.method is InertiaMethod.FILLED
     assert found.volume == pytest.approx(480_000 + 240_000, rel=0.01)
 
@@ -284,5 +349,7 @@ def test_a_surface_that_is_written_in_two_tessellations_warns():
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     other = np.array([t for a, b, c, d in quads for t in ((a, b, d), (b, c, d))])
     assert shape_inertia(TriangleMesh(cube.vertices, other), density=1.0).mass == pytest.approx(1.0)
-    doubled = shape_inertia(TriangleMesh(cube.vertices, np.concatenate([cube.faces, other])), density=1.0)
+    doubled = shape_inertia(
+        TriangleMesh(cube.vertices, np.concatenate([cube.faces, other])), density=1.0
+    )
     assert any("counts twice" in note for note in doubled.notes)

@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from dhkit.description import Base, Box, Capsule, Convention, Cylinder, Mesh, Placement, Shape, Sphere, Tool
+from dhkit.description import (
+    Base,
+    Box,
+    Capsule,
+    Convention,
+    Cylinder,
+    Mesh,
+    Placement,
+    Shape,
+    Sphere,
+    Tool,
+)
 from dhkit.description.frames import world_to_frames
 from dhkit.description.library import library_robot, robots
 from dhkit.description.numbers import matrix
@@ -29,7 +40,9 @@ def arms(draw):
     """Tables of both conventions and both kinds of joints, some with limits and a tool."""
     table = draw(st.lists(rows, min_size=1, max_size=6))
     kinds = "".join(draw(st.sampled_from("RRP")) for _ in table)
-    arm = from_dh(table, kinds=kinds, convention=draw(st.sampled_from(["standard", "modified"])), length="mm")
+    arm = from_dh(
+        table, kinds=kinds, convention=draw(st.sampled_from(["standard", "modified"])), length="mm"
+    )
     limits = draw(st.sampled_from([None, (0, 0), (0, 0.5), (0.2, 0.5), (-0.5, 0), (-0.4, 0.6)]))
     if limits:
         low, high = map(exact, limits)
@@ -80,7 +93,10 @@ def distance(part, points):
             beyond = np.abs(local) - np.array(sizes(part.geometry)) / 2
         case Cylinder():
             radius, length = sizes(part.geometry)
-            beyond = np.stack([np.hypot(local[:, 0], local[:, 1]) - radius, np.abs(local[:, 2]) - length / 2], axis=1)
+            beyond = np.stack(
+                [np.hypot(local[:, 0], local[:, 1]) - radius, np.abs(local[:, 2]) - length / 2],
+                axis=1,
+            )
         case Sphere():
             beyond = np.linalg.norm(local, axis=1, keepdims=True) - sizes(part.geometry)
     return np.linalg.norm(np.maximum(beyond, 0), axis=1)
@@ -96,13 +112,18 @@ def spine(part):
 def check_touching(arm, share):
     """Each link is one piece, and shares a point of their joint's axis with the link before it."""
     numbers, parts = arm.numbers, link_parts(arm)
-    low, high = np.clip(numbers.lower, -arm.reach, arm.reach), np.clip(numbers.upper, -arm.reach, arm.reach)
+    low, high = (
+        np.clip(numbers.lower, -arm.reach, arm.reach),
+        np.clip(numbers.upper, -arm.reach, arm.reach),
+    )
     tolerance = TOUCH * (max(arm.reach, np.linalg.norm(numbers.T_last_tool[:3, 3])) or 1.0)
     frames = world_to_frames(arm, low + share * (high - low))
     links = [[part for part in parts if part.link == i] for i in range(arm.n + 1)]
     for link in links:
         found, left = [link[0]], link[1:]
-        while near := [p for p in left if any(near_each_other(p, other) < tolerance for other in found)]:
+        while near := [
+            p for p in left if any(near_each_other(p, other) < tolerance for other in found)
+        ]:
             found += near
             left = [p for p in left if p not in near]
         assert not left, f"loose parts on link {link[0].link}"
@@ -110,10 +131,15 @@ def check_touching(arm, share):
         T = frames[i - 1 if arm.convention is Convention.STANDARD else i]
         origin, axis = T[:3, 3], T[:3, 2]
         both = links[i - 1] + links[i]
-        spines = np.concatenate([spine(part) @ frames[part.link, :3, :3].T + frames[part.link, :3, 3] for part in both])
+        spines = np.concatenate(
+            [spine(part) @ frames[part.link, :3, :3].T + frames[part.link, :3, 3] for part in both]
+        )
         on_axis = origin + np.outer((spines - origin) @ axis, axis)
         gap = [
-            np.min([distance(p, (on_axis - frames[k, :3, 3]) @ frames[k, :3, :3]) for p in links[k]], axis=0)
+            np.min(
+                [distance(p, (on_axis - frames[k, :3, 3]) @ frames[k, :3, :3]) for p in links[k]],
+                axis=0,
+            )
             for k in (i - 1, i)
         ]
         assert np.maximum(*gap).min() < tolerance, f"a gap at joint {i}"
@@ -152,8 +178,12 @@ def test_units_do_not_matter_and_a_doubled_arm_looks_the_same(table, convention)
     factor = 2.0 if any(d or a for _, d, a, _ in table) else 1.0
     for part, same, twice in zip(millimetre, metre, double, strict=True):
         assert part.geometry == same.geometry and np.array_equal(part.T_link_part, same.T_link_part)
-        assert sizes(twice.geometry) == pytest.approx([factor * size for size in sizes(part.geometry)], rel=1e-5)
-        assert np.allclose(twice.T_link_part[:3, 3], factor * part.T_link_part[:3, 3], rtol=1e-9, atol=1e-12)
+        assert sizes(twice.geometry) == pytest.approx(
+            [factor * size for size in sizes(part.geometry)], rel=1e-5
+        )
+        assert np.allclose(
+            twice.T_link_part[:3, 3], factor * part.T_link_part[:3, 3], rtol=1e-9, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("name", ON_THE_FLOOR)
@@ -161,13 +191,19 @@ def test_units_do_not_matter_and_a_doubled_arm_looks_the_same(table, convention)
 def test_an_arm_that_rises_stands_on_the_floor(name, height):
     arm = library_robot(name)
     base = replace(arm, base=Base(Placement((ZERO, ZERO, exact(height)))))
-    heights = np.concatenate([spine(part)[:, 2] for part in link_parts(base) if part.link == 0]) + height
+    heights = (
+        np.concatenate([spine(part)[:, 2] for part in link_parts(base) if part.link == 0]) + height
+    )
     assert abs(heights.min()) < TOUCH * arm.reach
 
 
 def test_each_drum_of_a_spherical_wrist_is_seen_behind_the_one_before():
     """The drums that links 4 and 5 of the IRB 140 carry for joints 5 and 6."""
-    at_wrist = [part for part in link_parts(library_robot("irb140")) if np.allclose(part.T_link_part, np.eye(4))]
+    at_wrist = [
+        part
+        for part in link_parts(library_robot("irb140"))
+        if np.allclose(part.T_link_part, np.eye(4))
+    ]
     (fifth, length5), (sixth, length6) = (
         max(sizes(part.geometry) for part in at_wrist if part.link == i) for i in (4, 5)
     )
@@ -185,7 +221,10 @@ def test_a_bar_is_not_twisted_in_its_block():
 
 def test_given_shapes_keep_their_place_color_and_parameters():
     turned = Placement((exact(0.1), ZERO, parse("h", ("h",))), (ZERO, parse("pi/2"), ZERO))
-    ball, box = Shape(Sphere(parse("h", ("h",))), turned, "#c8102e"), Shape(Box((parse("h/2", ("h",)),) * 3))
+    ball, box = (
+        Shape(Sphere(parse("h", ("h",))), turned, "#c8102e"),
+        Shape(Box((parse("h/2", ("h",)),) * 3)),
+    )
     capsule = Shape(Capsule(exact(0.1), parse("2*h", ("h",))), turned)
     arm = from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)], parameters={"h": 0.2})
     shaped = replace(
@@ -199,23 +238,31 @@ def test_given_shapes_keep_their_place_color_and_parameters():
     on = {i: [part for part in parts if part.link == i] for i in range(3)}
     assert [part.geometry for part in on[0]] == [Box((exact(0.1),) * 3)]
     assert [part.geometry for part in on[1]] == [Sphere(exact(0.2)), Box((exact(0.1),) * 3)]
-    assert on[1][0].color == "#c8102e" and np.array_equal(on[1][0].T_link_part, matrix(turned, values))
+    assert on[1][0].color == "#c8102e" and np.array_equal(
+        on[1][0].T_link_part, matrix(turned, values)
+    )
     assert on[2][-1].geometry == Capsule(exact(0.1), exact(0.4))
-    assert np.allclose(on[2][-1].T_link_part, shaped.numbers.T_last_tool @ matrix(turned, values), atol=ROUNDING)
+    assert np.allclose(
+        on[2][-1].T_link_part, shaped.numbers.T_last_tool @ matrix(turned, values), atol=ROUNDING
+    )
     check_parts(shaped)
 
 
 def test_a_link_whose_mesh_is_missing_is_drawn_from_the_table(tmp_path: Path):
     arm = from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)])
     shapes = (Shape(Mesh("arm.stl", (exact(0.001),) * 3), color="#c8102e"),)
-    meshed = replace(arm, joints=(replace(arm.joints[0], shapes=shapes), arm.joints[1]), mesh_folder=tmp_path)
+    meshed = replace(
+        arm, joints=(replace(arm.joints[0], shapes=shapes), arm.joints[1]), mesh_folder=tmp_path
+    )
     for one, other in zip(link_parts(meshed), link_parts(arm), strict=True):
         assert one.geometry == other.geometry and one.color == other.color
     assert missing_shapes(meshed) == ("mesh 'arm.stl' of link 1, which cannot be read",)
     # What it has beside the mesh stays, and is all that is drawn.
     beside = (Shape(Sphere(exact(0.1))), *shapes)
     with_ball = replace(meshed, joints=(replace(arm.joints[0], shapes=beside), arm.joints[1]))
-    assert [part.geometry for part in link_parts(with_ball) if part.link == 1] == [Sphere(exact(0.1))]
+    assert [part.geometry for part in link_parts(with_ball) if part.link == 1] == [
+        Sphere(exact(0.1))
+    ]
     assert missing_shapes(with_ball) == missing_shapes(meshed)
     (tmp_path / "arm.stl").write_text("solid arm\nfacet normal 0 0 1\nendfacet\nendsolid\n")
     files = [part.file for part in link_parts(meshed) if isinstance(part.geometry, Mesh)]

@@ -24,7 +24,10 @@ def parsed(arm):
 @pytest.mark.parametrize("name", robots())
 def test_the_checked_in_urdfs_are_fresh(name):
     """Run `make assets` when this fails. Numbers may differ by another machine's rounding."""
-    old, new = (text.replace('"', " ").split() for text in (asset(f"urdf/{name}.urdf").read_text(), library_urdf(name)))
+    old, new = (
+        text.replace('"', " ").split()
+        for text in (asset(f"urdf/{name}.urdf").read_text(), library_urdf(name))
+    )
     assert len(old) == len(new)
     for a, b in zip(old, new, strict=True):
         if a != b:
@@ -52,13 +55,17 @@ def test_limits_and_friction_are_those_of_the_description():
     assert float(limit.get("upper")) == math.radians(160)
     assert float(limit.get("effort")) == 97.6
     assert float(dynamics.get("damping")) == pytest.approx(62.6111**2 * 0.00148, rel=1e-15)
-    assert float(dynamics.get("friction")) == pytest.approx(62.6111 * (0.395 + 0.435) / 2, rel=1e-15)
+    assert float(dynamics.get("friction")) == pytest.approx(
+        62.6111 * (0.395 + 0.435) / 2, rel=1e-15
+    )
 
 
 def test_what_is_unlimited_gets_numbers_in_the_urdf_and_none_in_the_model():
     arm = from_dh([(0, 0, 3, 0), (0, 0, 0, 0)], kinds="RP")
     revolute, prismatic = (
-        joint.find("limit") for joint in parsed(arm).findall("joint") if joint.find("limit") is not None
+        joint.find("limit")
+        for joint in parsed(arm).findall("joint")
+        if joint.find("limit") is not None
     )
     assert float(revolute.get("upper")) == 2 * math.pi
     assert float(prismatic.get("lower")) == -3.0
@@ -72,7 +79,10 @@ def test_what_is_unlimited_gets_numbers_in_the_urdf_and_none_in_the_model():
 def test_the_model_has_what_a_urdf_cannot_say():
     arm = library_robot("puma560")
     model = pinocchio_model(arm)
-    gear, rotor = np.array([-62.6111, 107.815, -53.7063, 76.0364, 71.923, 76.686]), [2e-4] * 3 + [3.3e-5] * 3
+    gear, rotor = (
+        np.array([-62.6111, 107.815, -53.7063, 76.0364, 71.923, 76.686]),
+        [2e-4] * 3 + [3.3e-5] * 3,
+    )
     assert np.allclose(model.armature, gear**2 * rotor, rtol=1e-15)
     assert np.array_equal(model.gravity.linear, [0, 0, -9.81])
     assert np.array_equal(pinocchio_model(library_robot("planar2r")).gravity.linear, [0, -9.81, 0])
@@ -84,7 +94,14 @@ def test_the_model_has_what_a_urdf_cannot_say():
 
 @pytest.mark.parametrize(
     "source",
-    ["<!-- & ]]> -- rods -", 'x --->\n<link name="evil"/>', "----><joint/>", "ends in -", "---", "--> <link/> <!--"],
+    [
+        "<!-- & ]]> -- rods -",
+        'x --->\n<link name="evil"/>',
+        "----><joint/>",
+        "ends in -",
+        "---",
+        "--> <link/> <!--",
+    ],
 )
 def test_text_in_sources_stays_text(source):
     arm = replace(library_robot("planar2r"), source=source)
@@ -131,14 +148,18 @@ def test_folders_are_created_and_what_is_none_is_said(tmp_path):
 
 
 def test_meshes_may_be_named_as_ros_names_them(tmp_path):
-    files = write_urdf(library_robot("puma560"), tmp_path / "puma.urdf", mesh_prefix="package://my_robot/meshes/")
+    files = write_urdf(
+        library_robot("puma560"), tmp_path / "puma.urdf", mesh_prefix="package://my_robot/meshes/"
+    )
     names = re.findall(r'filename="([^"]*)"', files[0].read_text())
     assert names
     assert all(name.startswith("package://my_robot/meshes/puma560/") for name in names)
     assert all(file.is_file() for file in files)
 
 
-@pytest.mark.parametrize("name", ["meshes/../../../etc/passwd", "urdf/none.urdf", "src", "", "/etc/passwd"])
+@pytest.mark.parametrize(
+    "name", ["meshes/../../../etc/passwd", "urdf/none.urdf", "src", "", "/etc/passwd"]
+)
 def test_assets_are_only_our_own(name):
     with pytest.raises(DescriptionError, match="no packaged file"):
         asset(name)

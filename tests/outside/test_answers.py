@@ -42,7 +42,10 @@ def test_verdict_and_mistake(report, case):
 
 
 def test_a_tasks_names_in_a_matlab_file(report):
-    assert report(TASKS / "s01_task_names_in_matlab", "g.m", "--task", "task.toml")["verdict"] == "correct"
+    assert (
+        report(TASKS / "s01_task_names_in_matlab", "g.m", "--task", "task.toml")["verdict"]
+        == "correct"
+    )
 
 
 @pytest.mark.slow
@@ -55,7 +58,8 @@ def test_a_product_of_the_file_is_judged(report):
 
 
 @pytest.mark.parametrize(
-    ("folder", "file"), [("s11_state_vector_matlab", "plant.m"), ("s13_input_torque_judged", "sim.m")]
+    ("folder", "file"),
+    [("s11_state_vector_matlab", "plant.m"), ("s13_input_torque_judged", "sim.m")],
 )
 def test_states_taken_apart_and_inputs(report, folder, file):
     assert report(TASKS / folder, file, "--robot", "rr.toml")["verdict"] == "correct"

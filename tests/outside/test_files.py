@@ -29,7 +29,9 @@ def words(capsys, *arguments):
 
 
 def test_a_tiny_hole_beside_shared_walls_does_not_count_a_block_twice():
-    shape = shape_inertia(read_mesh(DATA / "c01_tiny_hole_beside_shared_walls" / "part.stl"), density=1.0)
+    shape = shape_inertia(
+        read_mesh(DATA / "c01_tiny_hole_beside_shared_walls" / "part.stl"), density=1.0
+    )
     outer, inner, shared = 480000.0, 198000.0, 108000.0
     assert 0.99 * (outer + inner) < shape.volume < 1.01 * (outer + inner + shared)
 
@@ -47,7 +49,13 @@ def test_two_bodies_one_of_them_inside_out():
 def test_a_last_link_without_a_part_says_how_to_map_it(capsys, tmp_path):
     folder = DATA / "c06_last_link_without_part"
     status, said = words(
-        capsys, "import-cad", f"{folder}/parts", "--table", f"{folder}/arm.toml", "-o", str(tmp_path / "new")
+        capsys,
+        "import-cad",
+        f"{folder}/parts",
+        "--table",
+        f"{folder}/arm.toml",
+        "-o",
+        str(tmp_path / "new"),
     )
     assert status == 0 or '2="' in said
 
@@ -66,13 +74,34 @@ def test_four_axes_that_meet_are_solved_or_refused_in_one_line():
 
 
 def test_published_poses_of_the_kr210():
-    rows = [(0, 0, 0.75, 0), (-90, 0.35, 0, -90), (0, 1.25, 0, 0), (-90, -0.054, 1.5, 0), (90, 0, 0, 0), (-90, 0, 0, 0)]
-    table = Arm.from_dh(rows, order=("alpha", "a", "d", "theta"), convention="modified", angle="deg", name="kr210")
+    rows = [
+        (0, 0, 0.75, 0),
+        (-90, 0.35, 0, -90),
+        (0, 1.25, 0, 0),
+        (-90, -0.054, 1.5, 0),
+        (90, 0, 0, 0),
+        (-90, 0, 0, 0),
+    ]
+    table = Arm.from_dh(
+        rows, order=("alpha", "a", "d", "theta"), convention="modified", angle="deg", name="kr210"
+    )
     arm = table.with_tool(dhkit.pose((0, 0, 0.303)))
     published = [
-        ([-0.65, 0.45, -0.36, 0.95, 0.79, 0.49], [2.16135, -1.42635, 1.55109], [1.89451, -1.44302, 1.69366]),
-        ([-0.79, -0.11, -2.33, 1.94, 1.14, -3.68], [-0.56754, 0.93663, 3.0038], [-0.638, 0.64198, 2.9988]),
-        ([-2.99, -0.12, 0.94, 4.06, 1.29, -4.12], [-1.3863, 0.02074, 0.90986], [-1.1669, -0.17989, 0.85137]),
+        (
+            [-0.65, 0.45, -0.36, 0.95, 0.79, 0.49],
+            [2.16135, -1.42635, 1.55109],
+            [1.89451, -1.44302, 1.69366],
+        ),
+        (
+            [-0.79, -0.11, -2.33, 1.94, 1.14, -3.68],
+            [-0.56754, 0.93663, 3.0038],
+            [-0.638, 0.64198, 2.9988],
+        ),
+        (
+            [-2.99, -0.12, 0.94, 4.06, 1.29, -4.12],
+            [-1.3863, 0.02074, 0.90986],
+            [-1.1669, -0.17989, 0.85137],
+        ),
     ]
     for q, tool, wrist in published:
         assert np.abs(arm.fk(q)[:3, 3] - tool).max() < ROUNDED_JOINTS
@@ -83,7 +112,14 @@ def test_published_poses_of_the_kr210():
 
 @pytest.mark.slow
 def test_the_published_table_of_the_gen3_lite_finds_the_joint_values_of_every_pose():
-    rows = [(0, 0, 0, 243.3), (90, 0, 90, 30), (180, 280, 90, 20), (90, 0, 90, 245), (90, 0, 180, 57), (90, 0, 90, 235)]
+    rows = [
+        (0, 0, 0, 243.3),
+        (90, 0, 90, 30),
+        (180, 280, 90, 20),
+        (90, 0, 90, 245),
+        (90, 0, 180, 57),
+        (90, 0, 90, 235),
+    ]
     order = ("alpha", "a", "theta", "d")
     arm = Arm.from_dh(rows, order=order, angle="deg", length="mm", convention="modified")
     q = np.random.default_rng(0).uniform(-2.5, 2.5, (40, 6))
@@ -95,7 +131,11 @@ def test_the_published_table_of_the_gen3_lite_finds_the_joint_values_of_every_po
 
 
 def test_uniform_links_of_a_calibrated_ur_are_as_long_as_the_arm():
-    rows = [(-1e-5, 0.089, 0.00028, 1.5703), (-1.437, 574.2, -0.0567, -0.000734), (2.0254, -507.4, -0.3265, 0.003256)]
+    rows = [
+        (-1e-5, 0.089, 0.00028, 1.5703),
+        (-1.437, 574.2, -0.0567, -0.000734),
+        (2.0254, -507.4, -0.3265, 0.003256),
+    ]
     rows += [(-0.5883, -66.77, 0, 1.5704), (0, 0.095, 0, -1.571), (0, 0.0826, 0, 0)]
     arm = Arm.from_dh(rows).with_uniform_links()
     reach, mass_of_a_link = 1.2, 1.0
@@ -104,7 +144,12 @@ def test_uniform_links_of_a_calibrated_ur_are_as_long_as_the_arm():
 
 def test_home_of_the_open_manipulator():
     bend = np.degrees(np.arctan2(24, 128))
-    rows = [(0, 0, 77, 0), (0, -90, 0, bend - 90), (np.hypot(24, 128), 0, 0, 90 - bend), (124, 0, 0, 0)]
+    rows = [
+        (0, 0, 77, 0),
+        (0, -90, 0, bend - 90),
+        (np.hypot(24, 128), 0, 0, 90 - bend),
+        (124, 0, 0, 0),
+    ]
     order = ("a", "alpha", "d", "theta")
     table = Arm.from_dh(rows, order=order, convention="modified", angle="deg", length="mm")
     arm = table.with_tool(dhkit.pose((0.126, 0, 0)))
@@ -113,8 +158,12 @@ def test_home_of_the_open_manipulator():
 
 
 def test_numbers_as_text_without_a_unit_are_refused_with_the_cure():
-    with pytest.raises(DhkitError, match=r"row 1: d: '243\.3' is text without a unit; .* 243\.3\*mm"):
-        Arm.from_dh([("0", "243.3", "0", "90"), ("0", "30", "280", "180")], angle="deg", length="mm")
+    with pytest.raises(
+        DhkitError, match=r"row 1: d: '243\.3' is text without a unit; .* 243\.3\*mm"
+    ):
+        Arm.from_dh(
+            [("0", "243.3", "0", "90"), ("0", "30", "280", "180")], angle="deg", length="mm"
+        )
 
 
 def test_a_modified_table_with_every_column_makes_the_urdf_of_its_product():
@@ -125,7 +174,12 @@ def test_a_modified_table_with_every_column_makes_the_urdf_of_its_product():
     for (alpha, a, theta, d), x in zip(rows, q, strict=True):
         # Craig (2005), eq. 3.6.
         ct, st, ca, sa = np.cos(theta + x), np.sin(theta + x), np.cos(alpha), np.sin(alpha)
-        T = T @ [[ct, -st, 0, a], [st * ca, ct * ca, -sa, -d * sa], [st * sa, ct * sa, ca, d * ca], [0, 0, 0, 1]]
+        T = T @ [
+            [ct, -st, 0, a],
+            [st * ca, ct * ca, -sa, -d * sa],
+            [st * sa, ct * sa, ca, d * ca],
+            [0, 0, 0, 1],
+        ]
     model = pin.buildModelFromXML(arm.urdf())
     data = model.createData()
     pin.framesForwardKinematics(model, data, q)
@@ -201,7 +255,9 @@ def test_crooked_axes_agree_with_pinocchio():
     for q in np.random.default_rng(0).uniform(-1, 1, (20, 3)):
         turns = [np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])]
         pin.framesForwardKinematics(model, data, np.array([*turns, q[2]]))
-        assert data.oMf[model.getFrameId("part3")].homogeneous == pytest.approx(arm.fk(q), abs=1e-10)
+        assert data.oMf[model.getFrameId("part3")].homogeneous == pytest.approx(
+            arm.fk(q), abs=1e-10
+        )
 
 
 def test_dynamics_with_continuous_joints_beside_the_chain():
@@ -234,7 +290,9 @@ def test_a_blank_line_before_the_header_is_no_fault():
 def test_iteration_reaches_the_poses_of_a_rounded_file():
     arm = Arm.load(DATA / "u21_numeric_ik_out_of_reach" / "arm.urdf")
     numbers = arm.description.numbers
-    q = np.random.default_rng(0).uniform(np.maximum(numbers.lower, -np.pi), np.minimum(numbers.upper, np.pi), (60, 6))
+    q = np.random.default_rng(0).uniform(
+        np.maximum(numbers.lower, -np.pi), np.minimum(numbers.upper, np.pi), (60, 6)
+    )
     status = arm.ik_numeric(arm.fk(q)).status
     assert np.mean(status == "ok") > 0.98
 

@@ -41,7 +41,9 @@ def verdict_and_left_out(program, folder):
 def results(tmp_path_factory):
     """Every program that this run takes, with its verdict and what was left out."""
     folder = tmp_path_factory.mktemp("programs")
-    return [(program, *verdict_and_left_out(program, folder)) for program in PROGRAMS if taken(program)]
+    return [
+        (program, *verdict_and_left_out(program, folder)) for program in PROGRAMS if taken(program)
+    ]
 
 
 def test_no_verdict_is_another_than_that_of_the_program_run(results):
@@ -49,13 +51,19 @@ def test_no_verdict_is_another_than_that_of_the_program_run(results):
     other = [
         (program["file"], program["about"], verdict, program["accept"])
         for program, verdict, _ in results
-        if verdict not in program["accept"] and verdict not in allowed and not program.get("names_unjudged")
+        if verdict not in program["accept"]
+        and verdict not in allowed
+        and not program.get("names_unjudged")
     ]
     assert not other
 
 
 def test_few_right_programs_are_refused(results):
-    right = [(program["file"], verdict) for program, verdict, _ in results if "correct" in program["accept"]]
+    right = [
+        (program["file"], verdict)
+        for program, verdict, _ in results
+        if "correct" in program["accept"]
+    ]
     unread = [
         program["file"]
         for program, verdict, _ in results

@@ -14,7 +14,16 @@ import dhkit
 from acceptance import only_accepting
 from dhkit.description import from_dh, library_robot, pose
 from dhkit.errors import DescriptionError, PlanningError, UnreachableError
-from dhkit.planning import Constraint, MotorPower, Obstacle, Payload, Planner, ToolDirection, ToolOrientation, ToolSpeed
+from dhkit.planning import (
+    Constraint,
+    MotorPower,
+    Obstacle,
+    Payload,
+    Planner,
+    ToolDirection,
+    ToolOrientation,
+    ToolSpeed,
+)
 from dhkit.trajectories import Limits, Trajectory
 from planning_reference import bare, slide
 
@@ -38,7 +47,8 @@ def refused(message, call, kind=PlanningError):
 def test_a_start_or_goal_outside_the_limits(planner):
     outside = np.add(GOAL, [3.0, 0, 0, 0, 0, 0])
     refused(
-        r"^goal: joint waist is at 4.2 rad, above its upper limit, 2.79253 rad$", lambda: planner.solve(START, outside)
+        r"^goal: joint waist is at 4.2 rad, above its upper limit, 2.79253 rad$",
+        lambda: planner.solve(START, outside),
     )
     low = np.subtract(START, [0, 2.0, 0, 0, 0, 0])
     refused(
@@ -78,9 +88,9 @@ def test_a_pose_for_which_nothing_was_found_is_not_called_out_of_reach():
     tilted = from_dh([*rows, (0, 0, 0, "-pi/2"), (0, 0.1, 0, 0)])
     refused(
         r"^goal: no joint values were found that bring the tool to this pose, at \(0, 0, 0.3\) m; that does not prove",
-        lambda: Planner(tilted, limits=Limits.of(tilted, lower=-3.0, upper=3.0, velocity=2.0)).solve(
-            START, pose((0, 0, 0.3))
-        ),
+        lambda: Planner(
+            tilted, limits=Limits.of(tilted, lower=-3.0, upper=3.0, velocity=2.0)
+        ).solve(START, pose((0, 0, 0.3))),
     )
 
 
@@ -97,9 +107,16 @@ def test_what_is_no_pose_or_configuration(planner):
     T = np.eye(4)
     T[0, 0] = 2.0
     refused(r"^goal: ", lambda: planner.solve(START, T))
-    refused(r"^goal: puma560 has no configuration 'redy'; it has .*ready", lambda: planner.solve(START, "redy"))
+    refused(
+        r"^goal: puma560 has no configuration 'redy'; it has .*ready",
+        lambda: planner.solve(START, "redy"),
+    )
     refused(r"goal has shape \(5,\); expected", lambda: planner.solve(START, GOAL[:5]), ValueError)
-    refused(r"goal has values that are not finite", lambda: planner.solve(START, np.full(6, np.nan)), ValueError)
+    refused(
+        r"goal has values that are not finite",
+        lambda: planner.solve(START, np.full(6, np.nan)),
+        ValueError,
+    )
     refused(r"start is a pose", lambda: planner.solve(np.eye(4), GOAL), ValueError)
 
 
@@ -141,7 +158,9 @@ def test_no_way_around_an_obstacle(law, iterations):
     messages = set()
     for _ in range(2):
         with pytest.raises(PlanningError) as refusal:
-            Planner(arm, intervals=24).solve([-0.8, 0.0], [0.8, 0.0], obstacles=WALL, max_iterations=iterations)
+            Planner(arm, intervals=24).solve(
+                [-0.8, 0.0], [0.8, 0.0], obstacles=WALL, max_iterations=iterations
+            )
         messages.add(str(refusal.value))
     (message,) = messages
     assert re.match(
@@ -158,7 +177,9 @@ def test_not_converged():
     limits = Limits.of(arm, acceleration=1.0, upper=2.0, lower=-2.0)
     refused(
         r"^not converged \(.*, \d+ iterations\): [\w ]+ joint1 misses its bound by [\d.e+-]+ at \d+ % of the way",
-        lambda: Planner(arm, limits=limits, intervals=24).solve([0.0], [1.0], start_velocity=[10.0]),
+        lambda: Planner(arm, limits=limits, intervals=24).solve(
+            [0.0], [1.0], start_velocity=[10.0]
+        ),
     )
 
 
@@ -174,7 +195,9 @@ def test_a_duration_below_what_limits_allow():
     limits = Limits.of(PUMA, acceleration=5.0)
     refused(
         r"^a duration of 0.95 s is too short: the fastest motion found takes 1.1\d+ s$",
-        lambda: Planner(PUMA, "effort", limits=limits, intervals=16).solve(START, GOAL, duration=0.95),
+        lambda: Planner(PUMA, "effort", limits=limits, intervals=16).solve(
+            START, GOAL, duration=0.95
+        ),
     )
 
 
@@ -225,7 +248,8 @@ def test_the_default_limit_does_not_read_the_clock(monkeypatch):
 def test_a_constraint_that_an_end_breaks():
     flat = Planner(PUMA, constraints=[ToolDirection(tolerance=0.05)])
     refused(
-        r"^goal: its tool direction is not allowed: [\d.]+ deg off, 2.865 deg are$", lambda: flat.solve(START, GOAL)
+        r"^goal: its tool direction is not allowed: [\d.]+ deg off, 2.865 deg are$",
+        lambda: flat.solve(START, GOAL),
     )
     kept = Planner(PUMA, constraints=[ToolOrientation()])
     refused(r"^goal: its tool orientation is not allowed", lambda: kept.solve(START, GOAL))
@@ -241,9 +265,13 @@ def test_a_joint_without_limits():
 
 def test_an_arm_without_bodies():
     arm = bare()
-    motion = Planner(arm, limits=Limits.of(arm, velocity=1.0, acceleration=2.0), intervals=24).solve([0, 0], [1, -0.5])
+    motion = Planner(
+        arm, limits=Limits.of(arm, velocity=1.0, acceleration=2.0), intervals=24
+    ).solve([0, 0], [1, -0.5])
     assert motion.duration == pytest.approx(1 / 1.0 + 1.0 / 2.0, rel=5e-3)
-    refused("body", lambda: Planner(arm, "effort").solve([0, 0], [1, 1], duration=1.0), DescriptionError)
+    refused(
+        "body", lambda: Planner(arm, "effort").solve([0, 0], [1, 1], duration=1.0), DescriptionError
+    )
 
 
 def test_other_robots_motions(planner):
@@ -254,12 +282,24 @@ def test_other_robots_motions(planner):
 @pytest.mark.parametrize(
     ("make", "kind", "message"),
     [
-        (lambda: Planner(PUMA, "tome"), ValueError, "objective is 'tome'; expected one of time, effort, energy, jerk"),
+        (
+            lambda: Planner(PUMA, "tome"),
+            ValueError,
+            "objective is 'tome'; expected one of time, effort, energy, jerk",
+        ),
         (lambda: Planner(PUMA, 3), TypeError, "objective is 3"),
-        (lambda: Planner(PUMA, intervals=3), ValueError, "intervals is 3; expected a whole number from 6 to 2000"),
+        (
+            lambda: Planner(PUMA, intervals=3),
+            ValueError,
+            "intervals is 3; expected a whole number from 6 to 2000",
+        ),
         (lambda: Planner(PUMA, constraints=["slow"]), TypeError, "constraints has 'slow'"),
         (lambda: Planner(PUMA, limits=3), TypeError, "limits is 3"),
-        (lambda: Planner(PUMA, limits=Limits.of(slide())), ValueError, "limits are of 1 joints; puma560 has 6"),
+        (
+            lambda: Planner(PUMA, limits=Limits.of(slide())),
+            ValueError,
+            "limits are of 1 joints; puma560 has 6",
+        ),
         (lambda: ToolSpeed(-1), ValueError, "ToolSpeed: -1; expected positive numbers"),
         (lambda: MotorPower((1, math.nan)), ValueError, "MotorPower"),
         (lambda: ToolDirection(axis=(0, 0, 0)), ValueError, "ToolDirection"),
@@ -363,7 +403,8 @@ def test_constraints_that_are_no_values_are_refused():
         lambda constraint: Planner(arm.description, constraints=[constraint]),
     ):
         with pytest.raises(
-            TypeError, match=r"PlainSpeed has an attribute most that is not a dataclass field; declare it"
+            TypeError,
+            match=r"PlainSpeed has an attribute most that is not a dataclass field; declare it",
         ):
             planned(PlainSpeed(0.5))
         with pytest.raises(TypeError, match=r"ListedSpeed: .*unhashable.*; expected @dataclass"):

@@ -25,7 +25,9 @@ def planner(**options):
 def test_motions_and_errors_come_in_order(workers):
     calls = []
     made = planner(constraints=[ToolSpeed(5.0)])
-    found = made.solve_many(STARTS, GOALS, workers=workers, progress=lambda *done: calls.append(done))
+    found = made.solve_many(
+        STARTS, GOALS, workers=workers, progress=lambda *done: calls.append(done)
+    )
     assert isinstance(found[2], PlanningError) and "goal: joint" in str(found[2])
     for k in (0, 1, 3):
         alone = made.solve(STARTS[k], GOALS[k])
@@ -87,7 +89,10 @@ class Dies(ToolSpeed):
 @pytest.mark.slow
 def test_what_can_go_wrong_with_processes_is_said():
     found = planner(constraints=[Dies(5.0)]).solve_many(STARTS[:2], GOALS[:2], workers=2)
-    assert all("its process ended: for want of memory perhaps" in str(error) for error in found) and len(found) == 2
+    assert (
+        all("its process ended: for want of memory perhaps" in str(error) for error in found)
+        and len(found) == 2
+    )
 
     @dataclass(frozen=True)
     class Local(ToolSpeed):
@@ -112,7 +117,9 @@ def test_an_exception_in_progress_ends_the_rest():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        planner().solve_many(np.zeros((200, 2)), np.tile([[0.5, 0.2]], (200, 1)), workers=2, progress=stop)
+        planner().solve_many(
+            np.zeros((200, 2)), np.tile([[0.5, 0.2]], (200, 1)), workers=2, progress=stop
+        )
     assert calls == [1]
 
 
@@ -130,5 +137,9 @@ def test_a_planner_is_pickled_without_its_programs():
     made = planner(constraints=[ToolSpeed(5.0)], friction=True)
     made.solve([0, 0], [0.3, 0.1])
     again = pickle.loads(pickle.dumps(made))
-    assert (again.intervals, again.friction, again.constraints) == (made.intervals, made.friction, made.constraints)
+    assert (again.intervals, again.friction, again.constraints) == (
+        made.intervals,
+        made.friction,
+        made.constraints,
+    )
     assert again.solve([0, 0], [0.3, 0.1]).duration == made.solve([0, 0], [0.3, 0.1]).duration

@@ -160,10 +160,14 @@ def tool_motion(arm, motion):
 
     def velocity(t):
         pin.forwardKinematics(model, data, motion.q(t), motion.qd(t))
-        return pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).linear.copy()
+        return pin.getFrameVelocity(
+            model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        ).linear.copy()
 
     h = 1e-5
-    inside = (motion.breaks[:-1, None] + np.diff(motion.breaks)[:, None] * np.linspace(0.05, 0.95, 7)).ravel()
+    inside = (
+        motion.breaks[:-1, None] + np.diff(motion.breaks)[:, None] * np.linspace(0.05, 0.95, 7)
+    ).ravel()
     v = np.array([velocity(t) for t in inside])
     a = np.array([(velocity(t + h) - velocity(t - h)) / (2 * h) for t in inside])
     return v, a
@@ -190,7 +194,9 @@ def test_a_tool_speed_far_below_the_joints_speeds_is_kept(name, speed):
         max_iterations=100,
     )
     assert motion.report.certificate.ok
-    assert np.linalg.norm(tool_motion(arm.description, motion)[0], axis=1).max() <= speed * (1 + ALLOWED)
+    assert np.linalg.norm(tool_motion(arm.description, motion)[0], axis=1).max() <= speed * (
+        1 + ALLOWED
+    )
 
 
 @pytest.mark.slow
@@ -211,7 +217,9 @@ class Wall(Constraint):
 
     def rows(self, point, parameters):
         first, second = point.description.numbers.a
-        return (first * casadi.cos(point.q[0]) + second * casadi.cos(point.q[0] + point.q[1])) / self.x
+        return (
+            first * casadi.cos(point.q[0]) + second * casadi.cos(point.q[0] + point.q[1])
+        ) / self.x
 
     def measured(self, states, parameters):
         return states.T_world_tool[:, :1, 3] / self.x
@@ -231,13 +239,29 @@ def test_a_constraint_of_ones_own_is_kept_and_certified():
 @pytest.mark.parametrize(
     ("changed", "error", "message"),
     [
-        ({"measured": lambda self, s, p: np.where(abs(s.qd) > 0.5, np.nan, s.qd)}, PlanningError, "is not a number at"),
-        ({"measured": lambda self, s, p: s.qd[:, 0]}, ValueError, r"shape \((\d+),\); expected \(\1, k\)"),
+        (
+            {"measured": lambda self, s, p: np.where(abs(s.qd) > 0.5, np.nan, s.qd)},
+            PlanningError,
+            "is not a number at",
+        ),
+        (
+            {"measured": lambda self, s, p: s.qd[:, 0]},
+            ValueError,
+            r"shape \((\d+),\); expected \(\1, k\)",
+        ),
         ({"measured": lambda self, s, p: None}, TypeError, "Own.measured: found NoneType"),
         ({"measured": lambda self, s, p: s.qd > 2}, TypeError, "Own.measured: found"),
-        ({"measured": lambda self, s, p: s.qd * 1j}, TypeError, "Own.measured: found complex numbers"),
+        (
+            {"measured": lambda self, s, p: s.qd * 1j},
+            TypeError,
+            "Own.measured: found complex numbers",
+        ),
         ({"measured": Constraint.measured}, NotImplementedError, "Own has no method measured"),
-        ({"rows": lambda self, p, x: 5}, TypeError, r"Own.rows returned int; expected casadi.SX of shape \(k, 1\)"),
+        (
+            {"rows": lambda self, p, x: 5},
+            TypeError,
+            r"Own.rows returned int; expected casadi.SX of shape \(k, 1\)",
+        ),
         ({"rows": lambda self, p, x: p.qd.T}, TypeError, r"Own.rows returned \(1, 2\); expected"),
         ({"what": Constraint.what}, NotImplementedError, "Own has no property what"),
     ],
@@ -250,7 +274,9 @@ def test_a_constraint_of_ones_own_that_cannot_be_certified_is_refused(changed, e
     }
     own = type("Own", (Constraint,), members | changed)()
     with pytest.raises(error, match=message):
-        Planner(library_robot("planar2r"), constraints=[own], intervals=12).solve([0, 0], [0.6, -0.5])
+        Planner(library_robot("planar2r"), constraints=[own], intervals=12).solve(
+            [0, 0], [0.6, -0.5]
+        )
 
 
 def test_both_sides_of_a_constraint_are_certified():
@@ -270,7 +296,9 @@ def test_both_sides_of_a_constraint_are_certified():
     assert Checker(arm, limits, (Rate(),), (np.zeros(0),)).check(motion).ok
     faster = motion.slowed(0.9)
     checks = Checker(arm, limits, (Rate(),), (np.zeros(0),)).check(faster).checks
-    assert next(check.excess for check in checks if check.what == "rate") == pytest.approx(1 / 0.9 - 1, rel=1e-3)
+    assert next(check.excess for check in checks if check.what == "rate") == pytest.approx(
+        1 / 0.9 - 1, rel=1e-3
+    )
 
 
 def test_a_state_that_is_not_a_number_is_not_certified(monkeypatch):
@@ -299,7 +327,10 @@ def test_motors():
     line = TorqueSpeedLine(tuple(effort), tuple(1.2 * speed))
     motion = Planner(PUMA, constraints=[line], intervals=24).solve(START, GOAL)
     q, qd, qdd = grids(motion)
-    assert np.abs(inverse_dynamics(PUMA, q, qd, qdd) / effort + qd / (1.2 * speed)).max() <= 1 + ALLOWED
+    assert (
+        np.abs(inverse_dynamics(PUMA, q, qd, qdd) / effort + qd / (1.2 * speed)).max()
+        <= 1 + ALLOWED
+    )
 
 
 @pytest.mark.slow
@@ -307,11 +338,15 @@ def test_the_tools_orientation():
     arm = library_robot("ur5")
     start = np.array([0.0, -1.2, 1.5, -1.8, -1.57, 0.0])
     T = world_to_tool(arm, start)
-    there = pose(T[:3, 3] + [-0.15, 0.25, 0.1]) @ np.block([[T[:3, :3], np.zeros((3, 1))], [np.zeros((1, 3)), 1]])
+    there = pose(T[:3, 3] + [-0.15, 0.25, 0.1]) @ np.block(
+        [[T[:3, :3], np.zeros((3, 1))], [np.zeros((1, 3)), 1]]
+    )
     tolerance = np.radians(2)
     for constraint in (ToolOrientation(tolerance), ToolDirection((0, 0, 1), None, tolerance)):
         motion = Planner(arm, constraints=[constraint], intervals=24).solve(start, there)
-        seen = np.array([world_to_tool(arm, q)[:3, :3] for q in motion.q(np.linspace(0, motion.duration, 800))])
+        seen = np.array(
+            [world_to_tool(arm, q)[:3, :3] for q in motion.q(np.linspace(0, motion.duration, 800))]
+        )
         if isinstance(constraint, ToolOrientation):
             cosine = (np.einsum("kij,ij->k", seen, T[:3, :3]) - 1) / 2
         else:
@@ -325,9 +360,14 @@ def test_the_tools_orientation():
 @pytest.mark.slow
 def test_each_objective_is_best_at_what_it_asks_for():
     options = {"duration": 1.5}
-    objectives = {"effort": Effort(), "jerk": Jerk(), "energy": Energy(regenerates=True, motor_constants=(2.0,))}
+    objectives = {
+        "effort": Effort(),
+        "jerk": Jerk(),
+        "energy": Energy(regenerates=True, motor_constants=(2.0,)),
+    }
     motions = {
-        name: Planner(PUMA, term, intervals=16).solve(START, GOAL, **options) for name, term in objectives.items()
+        name: Planner(PUMA, term, intervals=16).solve(START, GOAL, **options)
+        for name, term in objectives.items()
     }
     for name, term in objectives.items():
         costs = {other: own_cost(term, motion) for other, motion in motions.items()}
@@ -555,6 +595,10 @@ def test_a_coarser_mesh_is_of_the_curve_that_led_to_the_motion_and_none_among_ob
     planner = Planner(arm, "effort")
     motion = planner.solve(start, goal, duration=1.02 * least, compare=True)
     half, cost = motion.report.coarse
-    assert half == motion.report.intervals // 2 and cost == pytest.approx(motion.report.cost, rel=0.01)
-    far = planner.solve(start, goal, duration=3.0, obstacles=[Obstacle.sphere(0.1, (5, 5, 5))], compare=True)
+    assert half == motion.report.intervals // 2 and cost == pytest.approx(
+        motion.report.cost, rel=0.01
+    )
+    far = planner.solve(
+        start, goal, duration=3.0, obstacles=[Obstacle.sphere(0.1, (5, 5, 5))], compare=True
+    )
     assert far.report.coarse is None

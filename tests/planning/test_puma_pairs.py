@@ -16,7 +16,9 @@ ALLOWED = 1e-6
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("speed", "near"), [(1.0, 0.005), pytest.param(3.0, 0.01, marks=only_accepting)])
+@pytest.mark.parametrize(
+    ("speed", "near"), [(1.0, 0.005), pytest.param(3.0, 0.01, marks=only_accepting)]
+)
 def test_pairs(law, speed, near):
     pairs = random_pairs(PUMA, law.samples(100, quick=3), seed=int(speed))
     limits = Limits.of(PUMA).scaled(velocity=speed)
@@ -34,16 +36,25 @@ def test_pairs(law, speed, near):
             law.holds(f"{what} above its limit, speeds x {speed:g}", excess, ALLOWED, k)
         best = fine.solve(start, goal, warm=motion).duration
         law.holds(
-            f"duration over that of a mesh {FINER} times finer, speeds x {speed:g}", motion.duration / best - 1, near, k
+            f"duration over that of a mesh {FINER} times finer, speeds x {speed:g}",
+            motion.duration / best - 1,
+            near,
+            k,
         )
         straight = toppra_duration(PUMA, start, goal, limits)
         law.holds(
-            f"duration over toppra's along the straight path, speeds x {speed:g}", motion.duration / straight, 1.005, k
+            f"duration over toppra's along the straight path, speeds x {speed:g}",
+            motion.duration / straight,
+            1.005,
+            k,
         )
         gains.append(straight / motion.duration - 1)
     law.takes(f"median seconds a solve, speeds x {speed:g}", np.median(seconds), 0.2)
     law.takes(f"95 % of solves, seconds, speeds x {speed:g}", np.quantile(seconds, 0.95), 0.5)
-    print(f"\n  toppra takes {100 * np.mean(gains):.2f} % longer on average, {100 * max(gains):.1f} % at most", end="")
+    print(
+        f"\n  toppra takes {100 * np.mean(gains):.2f} % longer on average, {100 * max(gains):.1f} % at most",
+        end="",
+    )
 
 
 @only_accepting

@@ -25,4 +25,9 @@ def test_every_robot(law, name):
         for what, excess in worst_excess(arm, motion, limits).items():
             law.holds(f"{what} above its limit", excess, 1e-6, k)
         assert np.abs(motion.q(motion.duration) - goal).max() < 1e-9
-        law.holds("duration over the quintic's", motion.duration / quintic(arm, start, goal).duration, 1.0, k)
+        law.holds(
+            "duration over the quintic's",
+            motion.duration / quintic(arm, start, goal).duration,
+            1.0,
+            k,
+        )

@@ -71,7 +71,9 @@ def coal_gap(motion, obstacle, rate=500.0):
             here = transform(np.stack([x, np.cross(z, x), z], axis=1), (a + b) / 2)
             result = coal.DistanceResult()
             shape = coal.Capsule(capsule.radius, length)
-            worst = min(worst, coal.distance(shape, here, solid, there, coal.DistanceRequest(), result))
+            worst = min(
+                worst, coal.distance(shape, here, solid, there, coal.DistanceRequest(), result)
+            )
     return worst
 
 
@@ -80,7 +82,9 @@ def test_scenes(law):
     seconds, solves, longer = [], [], []
     for k, (start, goal, obstacle) in enumerate(scenes(law.samples(20, quick=3))):
         motion = planner.solve(start, goal, obstacles=[obstacle], clearance=CLEARANCE)
-        law.holds("m short of the clearance, by coal", CLEARANCE - coal_gap(motion, obstacle), ROUNDING, k)
+        law.holds(
+            "m short of the clearance, by coal", CLEARANCE - coal_gap(motion, obstacle), ROUNDING, k
+        )
         for what, excess in worst_excess(PUMA, motion, planner.limits).items():
             law.holds(f"{what} above its limit", excess, 1e-6, k)
         seconds.append(motion.report.solve_seconds)
@@ -98,7 +102,10 @@ def test_the_direct_way_is_really_blocked():
     planner = Planner(PUMA, intervals=24)
     for start, goal, obstacle in scenes(2, seed=3):
         free = planner.solve(start, goal)
-        assert distance(PUMA, free.q(np.linspace(0, free.duration, 400)), [obstacle]).distance.min() < CLEARANCE
+        assert (
+            distance(PUMA, free.q(np.linspace(0, free.duration, 400)), [obstacle]).distance.min()
+            < CLEARANCE
+        )
 
 
 def test_an_obstacle_that_is_far_away_changes_nothing():
@@ -122,7 +129,9 @@ def cluttered(arm, count, seed):
                 continue
             box = rng.uniform() < 0.5
             obstacles.append(
-                Obstacle.box(rng.uniform(0.1, 0.3, 3), at) if box else Obstacle.sphere(rng.uniform(0.05, 0.15), at)
+                Obstacle.box(rng.uniform(0.1, 0.3, 3), at)
+                if box
+                else Obstacle.sphere(rng.uniform(0.05, 0.15), at)
             )
         states = rng.uniform(lower, upper, (200, arm.n))
         clear = states[distance(arm, states, obstacles).distance > 0.03]
@@ -142,7 +151,12 @@ def test_ten_obstacles(law, name):
     for k, (start, goal, obstacles) in enumerate(cluttered(arm, law.samples(30) // 10, seed=7)):
         motion = planner.solve(start, goal, obstacles=obstacles, clearance=CLEARANCE)
         q = motion.q(np.linspace(0, motion.duration, 2000))
-        law.holds("m short of the clearance", CLEARANCE - distance(arm, q, obstacles).distance.min(), ROUNDING, k)
+        law.holds(
+            "m short of the clearance",
+            CLEARANCE - distance(arm, q, obstacles).distance.min(),
+            ROUNDING,
+            k,
+        )
         for what, excess in worst_excess(arm, motion, planner.limits).items():
             law.holds(f"{what} above its limit", excess, 1e-6, k)
 
@@ -158,7 +172,10 @@ def beside_two_balls(arm, count, seed):
             Obstacle.sphere(0.07, middle + rng.uniform(-0.05, 0.05, 3)),
             Obstacle.sphere(0.07, rng.uniform([-0.8, -0.8, 0], [0.8, 0.8, 0.8])),
         ]
-        if distance(arm, np.stack([start, goal]), balls, self_collision=True).distance.min() > 0.022:
+        if (
+            distance(arm, np.stack([start, goal]), balls, self_collision=True).distance.min()
+            > 0.022
+        ):
             count -= 1
             yield start, goal, balls
 
@@ -167,15 +184,22 @@ def test_links_that_move_together_near_each_other_cost_no_time(law):
     """A plane between two links that is fixed in the world would have to separate them while both move."""
     arm = library_robot("ur5")
     planner = Planner(arm)
-    for k, (start, goal, balls) in enumerate(beside_two_balls(arm, law.samples(10, quick=2), seed=1)):
+    for k, (start, goal, balls) in enumerate(
+        beside_two_balls(arm, law.samples(10, quick=2), seed=1)
+    ):
         free = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE)
-        motion = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True)
+        motion = planner.solve(
+            start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True
+        )
         assert motion.report.is_converged, k
         q = motion.q(np.linspace(0, motion.duration, 2000))
         clear = distance(arm, q, balls, self_collision=True).distance.min()
         law.holds("m short of the clearance", CLEARANCE - clear, ROUNDING, k)
         law.holds(
-            "duration beside the motion without self-collision, less 1", motion.duration / free.duration - 1, 0.05, k
+            "duration beside the motion without self-collision, less 1",
+            motion.duration / free.duration - 1,
+            0.05,
+            k,
         )
 
 
@@ -183,9 +207,13 @@ def test_links_that_move_together_near_each_other_cost_no_time(law):
 def test_a_way_that_is_hardly_wider_than_the_clearance_is_found():
     # Paths that keep 5 mm more than the clearance do not exist here; OMPL's BKPIECE1 finds one that keeps 20 mm in 2 s.
     *_, scene = itertools.islice(random_scenes(SceneKind("puma560"), 0), 22)
-    motion = Planner(PUMA).solve(scene.start, scene.goal, obstacles=scene.obstacles, clearance=CLEARANCE)
+    motion = Planner(PUMA).solve(
+        scene.start, scene.goal, obstacles=scene.obstacles, clearance=CLEARANCE
+    )
     q = motion.q(np.linspace(0, motion.duration, 5000))
-    assert CLEARANCE - ROUNDING < distance(PUMA, q, scene.obstacles).distance.min() < CLEARANCE + 5e-3
+    assert (
+        CLEARANCE - ROUNDING < distance(PUMA, q, scene.obstacles).distance.min() < CLEARANCE + 5e-3
+    )
 
 
 def ball_near(q, gap):
@@ -205,7 +233,9 @@ def planner():
 
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("gap", [1e-5, 5e-4, 1e-3, 4e-3, 9.9e-3])
-def test_at_an_end_within_the_clearance_it_is_reduced_and_the_report_says_so(planner, backwards, gap):
+def test_at_an_end_within_the_clearance_it_is_reduced_and_the_report_says_so(
+    planner, backwards, gap
+):
     """It keeps three quarters of the gap within a tenth of a metre of travel, then all of the clearance of 10 mm."""
     start, goal = np.array([0, 0.8, -1.0, 0, 0.5, 0]), np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
     ball = ball_near(start, gap)
@@ -231,7 +261,11 @@ def test_goals_just_above_a_box_take_hardly_longer_than_without_it():
     while tried < sample_size(4, quick=2):
         start, goal = rng.uniform(-2.5, 2.5, (2, 6))
         axes, gap = world_axes(arm, goal[None])[0], rng.uniform(0.001, 0.008)
-        low, i, end = min((axes[i, e, 2] - capsules[i].radius, i, e) for i in range(1, len(capsules)) for e in (0, 1))
+        low, i, end = min(
+            (axes[i, e, 2] - capsules[i].radius, i, e)
+            for i in range(1, len(capsules))
+            for e in (0, 1)
+        )
         box = Obstacle.box((0.2, 0.2, 0.1), [*axes[i, end, :2], low - gap - 0.05], name="box")
         near = distance(arm, [start, goal], [box]).distance
         if near[0] < 0.03 or not 5e-4 < near[1] < 9.5e-3:
@@ -248,7 +282,10 @@ def test_goals_just_above_a_box_take_hardly_longer_than_without_it():
 
 def test_where_the_optimizer_finds_nothing_a_sampled_path_is_slowed_down():
     arm = library_robot("ur5")
-    start, goal = [-1.4379, 1.779, 1.5791, -0.7181, 1.0835, 0.3996], [-0.2954, 0.8203, -1.0922, -0.8264, 1.1664, -0.204]
+    start, goal = (
+        [-1.4379, 1.779, 1.5791, -0.7181, 1.0835, 0.3996],
+        [-0.2954, 0.8203, -1.0922, -0.8264, 1.1664, -0.204],
+    )
     plate = Obstacle.box((0.3003, 0.3003, 0.00075), (-0.21556, -0.24517, -0.79135), name="plate")
     motion = Planner(arm).solve(start, goal, obstacles=[plate], self_collision=True)
     assert motion.report.certificate.ok
@@ -268,14 +305,18 @@ def test_many_obstacles_far_away_cost_little():
 def test_a_duration_that_is_too_short_among_obstacles_is_called_so():
     start, goal = np.array([0, 0.8, -1.0, 0, 0.5, 0]), np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
     ball = Obstacle.sphere(0.06, world_to_tool(PUMA, (start + goal) / 2)[:3, 3])
-    with pytest.raises(PlanningError, match=r"0\.88 s is too short: the fastest motion found without the obstacles"):
+    with pytest.raises(
+        PlanningError, match=r"0\.88 s is too short: the fastest motion found without the obstacles"
+    ):
         Planner(PUMA, "effort", intervals=16).solve(start, goal, duration=0.88, obstacles=[ball])
 
 
 def test_what_is_kept_clear_of_is_said():
     arm = library_robot("ur5")
     ends = [0, -1.2, 1.5, -1.8, -1.57, 0], [1.6, -1.0, 1.2, -1.0, -1.0, 0.5]
-    assert "clearance: 10 mm kept between links, " in str(Planner(arm).solve(*ends, self_collision=True).report)
+    assert "clearance: 10 mm kept between links, " in str(
+        Planner(arm).solve(*ends, self_collision=True).report
+    )
     both = Planner(arm).solve(*ends, self_collision=True, obstacles=[Floor(-1.0)]).report
     assert "clearance: 10 mm kept from obstacles and between links, " in str(both)
     assert "clearance of" not in str(both)
@@ -284,7 +325,9 @@ def test_what_is_kept_clear_of_is_said():
 def test_an_obstacle_thinner_than_the_way_between_two_points_is_not_missed():
     arm = library_robot("planar2r")
     sheet = Obstacle.box((0.5, 1e-3, 0.5), (1.6, 0.0, 0.0), name="sheet")
-    motion = Planner(arm, intervals=12).solve([-0.6, 0.1], [0.6, 0.1], obstacles=[sheet], clearance=0.0)
+    motion = Planner(arm, intervals=12).solve(
+        [-0.6, 0.1], [0.6, 0.1], obstacles=[sheet], clearance=0.0
+    )
     q = motion.q(np.linspace(0, motion.duration, 5000))
     assert distance(arm, q, [sheet]).distance.min() > -ROUNDING
 
@@ -292,7 +335,10 @@ def test_an_obstacle_thinner_than_the_way_between_two_points_is_not_missed():
 def test_floor_and_itself():
     arm = library_robot("ur5")
     planner = Planner(arm, intervals=16)
-    start, goal = np.array([0, -1.2, 1.5, -1.8, -1.57, 0]), np.array([1.6, -1.0, 1.2, -1.0, -1.0, 0.5])
+    start, goal = (
+        np.array([0, -1.2, 1.5, -1.8, -1.57, 0]),
+        np.array([1.6, -1.0, 1.2, -1.0, -1.0, 0.5]),
+    )
     motion = planner.solve(start, goal, obstacles=[Floor(0.0)], clearance=0.01, self_collision=True)
     q = motion.q(np.linspace(0, motion.duration, 1000))
     assert distance(arm, q, [Floor(0.0)], self_collision=True).distance.min() > 0.01 - ROUNDING

@@ -26,14 +26,18 @@ def test_a_table_of_large_lengths_does_not_widen_the_clearance(tmp_path):
     """Axes 1e-6 rad off parallel have a common normal hundreds of kilometres away."""
     elbow = '<joint name="elbow" type="revolute">\n    <origin xyz="-0.425 0 0" rpy="0 0 0" />'
     assert elbow in UR5
-    (tmp_path / "tilted.urdf").write_text(UR5.replace(elbow, elbow.replace('rpy="0 0 0"', 'rpy="0 1e-6 0"')))
+    (tmp_path / "tilted.urdf").write_text(
+        UR5.replace(elbow, elbow.replace('rpy="0 0 0"', 'rpy="0 1e-6 0"'))
+    )
     arm = dhkit.Arm.load(tmp_path / "tilted.urdf")
     assert arm.description.numbers.table_length > 1e4
     assert arm.description.reach < 2
     free = arm.plan(START, GOAL, intervals=24, compare=False)
     ball = Obstacle.sphere(0.02, arm.fk(free.q(free.duration / 2))[:3, 3])
     motion = planned(arm, ball, clearance=0.0)
-    assert arm.distance(motion.q(np.linspace(0, motion.duration, 2000)), [ball]).distance.min() > -1e-6
+    assert (
+        arm.distance(motion.q(np.linspace(0, motion.duration, 2000)), [ball]).distance.min() > -1e-6
+    )
 
 
 def test_a_link_whose_mesh_is_missing_is_named(tmp_path):
@@ -48,7 +52,10 @@ def test_a_link_whose_mesh_is_missing_is_named(tmp_path):
     report = planned(arm, Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
     assert report.not_checked[0] == "link 3 without a shape"
     assert report.not_checked[1:] == arm.description.warnings
-    assert "link 'link3': mesh 'forearm.stl' is not there; this shape is left out" in arm.description.warnings
+    assert (
+        "link 'link3': mesh 'forearm.stl' is not there; this shape is left out"
+        in arm.description.warnings
+    )
     assert "not checked for collisions: link 3 without a shape" in str(report)
     whole = planned(dhkit.Arm.load("ur5"), Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
     assert whole.not_checked == ()
@@ -58,12 +65,16 @@ def test_parts_that_stay_beside_an_obstacle_are_named_if_they_are_near_it():
     arm = dhkit.Arm.load("ur5")
     post = Obstacle.box((0.05, 0.05, 0.3), (0.1, 0.0, -0.15), name="post")
     q = np.array([[0.0, -1.2, 0.5, 0, 0, 0], [2.0, -1.2, 0.5, 0, 0, 0]])
-    assert arm.distance(q, [post]).not_checked == ("part of link 1 and post, 19.6 mm apart in all configurations",)
+    assert arm.distance(q, [post]).not_checked == (
+        "part of link 1 and post, 19.6 mm apart in all configurations",
+    )
     far = Obstacle.box((0.05, 0.05, 0.3), (0.8, 0.0, 0.5), name="far")
     assert arm.distance(q, [far]).not_checked == ()
     motion = arm.quintic(q[0], q[1])
     near = arm.plan(q[0], q[1], obstacles=[post], clearance=0.03, compare=False, intervals=24)
-    assert near.report.not_checked == ("part of link 1 and post, 19.6 mm apart in all configurations",)
+    assert near.report.not_checked == (
+        "part of link 1 and post, 19.6 mm apart in all configurations",
+    )
     assert arm.certify(motion, obstacles=[post], clearance=0.005, independent=True).independent.ok
 
 
@@ -74,11 +85,17 @@ def test_links_that_turn_about_the_vertical_alone_are_named_beside_a_floor():
     motion = arm.quintic("zero", np.full(6, 0.1), duration=2.0)
     assert arm.certify(motion, obstacles=[floor], clearance=0.01).not_checked == ()
     planar = dhkit.Arm.load("planar3r")
-    inside = planar.certify(planar.quintic(np.zeros(3), np.full(3, 0.1)), obstacles=[dhkit.planning.Floor(0.9)])
-    assert [words.split(",")[0] for words in inside.not_checked] == [f"part of link {k} and floor" for k in (1, 2, 3)]
+    inside = planar.certify(
+        planar.quintic(np.zeros(3), np.full(3, 0.1)), obstacles=[dhkit.planning.Floor(0.9)]
+    )
+    assert [words.split(",")[0] for words in inside.not_checked] == [
+        f"part of link {k} and floor" for k in (1, 2, 3)
+    ]
 
 
-@pytest.mark.parametrize(("name", "locked"), [("ur5", {2: 1.6}), ("ur5", {0: 0.4, 4: -1.0}), ("stanford", {2: 0.4})])
+@pytest.mark.parametrize(
+    ("name", "locked"), [("ur5", {2: 1.6}), ("ur5", {0: 0.4, 4: -1.0}), ("stanford", {2: 0.4})]
+)
 def test_links_of_a_locked_arm_are_where_they_were(name, locked):
     """Points of the solids are those of the whole arm with these joints held."""
     whole = dhkit.Arm.load(name)
@@ -98,7 +115,9 @@ def test_links_of_a_locked_arm_are_where_they_were(name, locked):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", different_robots_first([name for name in robots() if library_robot(name).n > 2]))
+@pytest.mark.parametrize(
+    "name", different_robots_first([name for name in robots() if library_robot(name).n > 2])
+)
 def test_distances_of_a_locked_arm_from_obstacles_are_those_of_the_whole_arm(tmp_path, name):
     """Random joints are held at random values; the robot file of the locked arm says the same."""
     whole = dhkit.Arm.load(name)
@@ -106,7 +125,11 @@ def test_distances_of_a_locked_arm_from_obstacles_are_those_of_the_whole_arm(tmp
     lower = whole.limits.lower.clip(-np.pi)
     upper = whole.limits.upper.clip(None, np.pi)
     obstacles = [
-        Obstacle.sphere(0.05 * whole.description.reach, tuple(whole.fk(rng.uniform(lower, upper))[:3, 3]), name=f"{k}")
+        Obstacle.sphere(
+            0.05 * whole.description.reach,
+            tuple(whole.fk(rng.uniform(lower, upper))[:3, 3]),
+            name=f"{k}",
+        )
         for k in range(3)
     ]
     held = np.sort(rng.permutation(whole.n)[: rng.integers(1, whole.n - 1)])
@@ -126,7 +149,9 @@ def test_a_pose_that_is_not_met_is_refused_unless_its_coordinates_are_named(name
     q = np.array([0.3, 0.4, 0.2, 0.1])[: arm.n].clip(arm.limits.lower, arm.limits.upper)
     start = np.full(arm.n, 0.05).clip(arm.limits.lower, arm.limits.upper)
     T = arm.fk(q) @ pose((0, 0, 0), euler=(0.9, 0.7, 0.4))
-    with pytest.raises(PlanningError, match=rf"^goal: {name} does not meet this pose: of its coordinates it meets"):
+    with pytest.raises(
+        PlanningError, match=rf"^goal: {name} does not meet this pose: of its coordinates it meets"
+    ):
         arm.plan(start, T, intervals=12, compare=False)
     met = arm.ik(T).met
     motion = arm.plan(start, T, coordinates=met, intervals=12, compare=False)
@@ -190,7 +215,9 @@ def test_shapes_beside_a_mesh_that_cannot_be_read_stay(tmp_path, content):
     ball = Obstacle.sphere(0.05, (0.3, 0.15, 0.5), name="ball")
     whole = robot_file(tmp_path, THREE_LINKS.format(base="[]", mesh=""))
     arm = robot_file(tmp_path, THREE_LINKS.format(base="[]", mesh=', { mesh = "cover.stl" }'))
-    assert np.array_equal(arm.distance([0, 0, 0], [ball]).per_obstacle, whole.distance([0, 0, 0], [ball]).per_obstacle)
+    assert np.array_equal(
+        arm.distance([0, 0, 0], [ball]).per_obstacle, whole.distance([0, 0, 0], [ball]).per_obstacle
+    )
     named = ("mesh 'cover.stl' of link 2, which cannot be read",)
     assert arm.distance([0, 0, 0], [ball]).not_checked == named
     for robot in (arm, arm.lock({2: 0.1})):
@@ -203,17 +230,23 @@ def test_shapes_beside_a_mesh_that_cannot_be_read_stay(tmp_path, content):
 def test_missing_meshes_of_base_and_tool_are_named(tmp_path, place):
     mesh = '[{ mesh = "gone.stl" }]'
     text = THREE_LINKS.format(base=mesh if place == "base" else "[]", mesh="")
-    arm = robot_file(tmp_path, text if place == "base" else text.replace("[base]", f"[tool]\nshape = {mesh}\n[base]"))
+    arm = robot_file(
+        tmp_path,
+        text if place == "base" else text.replace("[base]", f"[tool]\nshape = {mesh}\n[base]"),
+    )
     motion = arm.quintic([0] * 3, [0.02] * 3, duration=2)
     far = Obstacle.sphere(0.05, (3, 0, 0), name="far")
-    assert f"mesh 'gone.stl' of the {place}, which cannot be read" in arm.certify(motion, obstacles=[far]).not_checked
+    assert (
+        f"mesh 'gone.stl' of the {place}, which cannot be read"
+        in arm.certify(motion, obstacles=[far]).not_checked
+    )
 
 
 def test_a_reduced_clearance_between_shapes_is_named_in_every_certificate():
     arm = dhkit.Arm.load("cobra600")
-    q0 = np.array([-0.33, -0.24, 0.17, -1.14])
+    q0 = np.array([-0.33, -0.24, 0.05, -1.14])
     q1 = q0 + np.array([0, 0, -0.012, 0])
-    named = "all of the clearance during the whole motion: 40.5 mm between link 2 and link 4"
+    named = "all of the clearance near the ends: 14.4 mm between link 2 and link 4"
     certificate = arm.certify(arm.quintic(q0, q1), self_collision=True, clearance=0.1)
     assert named in certificate.not_checked
     path = joint_path(arm.description, tool_line(arm.fk(q0), arm.fk(q1)), q0)
@@ -236,7 +269,9 @@ def test_a_pair_that_is_steady_within_limits_alone_is_checked(tmp_path):
     )
     text = 'format = 1\nname = "s"\nconvention = "standard"\n[base]\n'
     text += "shape = [{ sphere = { radius = 0.01 }, xyz = [0.12, 0, 0] }]\n"
-    text += joint.format("-0.05, 0.05", "0.005", "0, 0, 0.3") + joint.format("3.1, 3.2", "0.01", "0.06, 0, 0")
+    text += joint.format("-0.05, 0.05", "0.005", "0, 0, 0.3") + joint.format(
+        "3.1, 3.2", "0.01", "0.06, 0, 0"
+    )
     arm = robot_file(tmp_path, text)
     wide = dhkit.Limits.of(arm, lower=-4, upper=4, velocity=9.0)
     motion = arm.quintic([0, 3.14], [0, -3.14], duration=3, limits=wide)
@@ -262,7 +297,8 @@ def test_a_slide_without_sensible_limits_hides_no_other_link(tmp_path, stroke):
 
 
 @pytest.mark.parametrize(
-    "vertices", ["0 0 0, 1 0 0, 0 1 0, 1 1 0", "0 0 0, 1 0 0, 0 1 0", "0 0 0, 1 0 0, 2 0 0", "1 1 1"]
+    "vertices",
+    ["0 0 0, 1 0 0, 0 1 0, 1 1 0", "0 0 0, 1 0 0, 0 1 0", "0 0 0, 1 0 0, 2 0 0", "1 1 1"],
 )
 def test_a_flat_mesh_is_measured(tmp_path, vertices):
     corners = vertices.split(", ")
@@ -286,15 +322,21 @@ def test_a_locked_arm_keeps_its_distance_from_the_floor():
     q = [0.41088506, -0.69063986, -1.37707943]
     locked = arm.lock({1: q[1], 2: q[2]})
     floor = [Floor(0.3)]
-    assert locked.distance(q[:1], floor).distance == pytest.approx(float(arm.distance(q, floor).distance), abs=1e-9)
+    assert locked.distance(q[:1], floor).distance == pytest.approx(
+        float(arm.distance(q, floor).distance), abs=1e-9
+    )
     assert not locked.certify(locked.quintic([0.0], [1.0], duration=3), obstacles=floor).ok
 
 
 def test_torque_limits_of_an_arm_without_bodies_are_refused():
     arm = dhkit.Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)])
     free = dhkit.Limits.of(arm, lower=-4, upper=4)
-    motion = arm.quintic([0, 0], [1, 1], duration=2, limits=free)  # a duration is given: nothing has to limit it
+    motion = arm.quintic(
+        [0, 0], [1, 1], duration=2, limits=free
+    )  # a duration is given: nothing has to limit it
     with pytest.raises(DescriptionError, match="no body, so the dynamics are unknown"):
         arm.certify(motion, dhkit.Limits.of(arm, torque=5))
-    with pytest.raises(ValueError, match="lower of joint 1 is inf; expected a number, or -inf for none"):
+    with pytest.raises(
+        ValueError, match="lower of joint 1 is inf; expected a number, or -inf for none"
+    ):
         dhkit.Limits.of(arm, lower=np.inf)

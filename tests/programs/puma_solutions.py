@@ -17,12 +17,17 @@ EDITS = {
     ],
     "no shoulder offset": [("beta = asin(min(1, d3 / rho))", "beta = 0.0")],
     "degrees": [
-        ("solutions.append([q1, q2, q3, q4, q5, q6])", "solutions.append(np.degrees([q1, q2, q3, q4, q5, q6]))")
+        (
+            "solutions.append([q1, q2, q3, q4, q5, q6])",
+            "solutions.append(np.degrees([q1, q2, q3, q4, q5, q6]))",
+        )
     ],
     "fails at singular poses": [
         ("q4, q6 = 0.0, atan2(W[1, 0], W[0, 0] if W[2, 2] > 0 else -W[0, 0])", "q4 = q6 = 0 / 0")
     ],
-    "slow": [("    solutions = []\n", "    solutions = []\n    import time\n\n    time.sleep(0.05)\n")],
+    "slow": [
+        ("    solutions = []\n", "    solutions = []\n    import time\n\n    time.sleep(0.05)\n")
+    ],
     "sign of the elbow": [("- atan2(d4, a3)", "+ atan2(d4, a3)")],
     "wrist transposed": [("W = R03.T @ T[:3, :3]", "W = (R03.T @ T[:3, :3]).T")],
     "raises out of reach": [

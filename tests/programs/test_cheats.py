@@ -26,10 +26,15 @@ def score(arm, path, text, **options):
 
 @pytest.mark.parametrize(
     ("name", "torques"),
-    [slow_if(True, "puma560_cao", [0, 49.00754232, 0, 0, 0, 0]), slow_if(True, "cobra600", [0, 0, -19.62, 0])],
+    [
+        slow_if(True, "puma560_cao", [0, 49.00754232, 0, 0, 0, 0]),
+        slow_if(True, "cobra600", [0, 0, -19.62, 0]),
+    ],
 )
 def test_a_constant_torque_follows_nothing(tmp_path, name, torques):
-    share, _ = score(Arm.load(name), tmp_path / "c.py", f"def controller(t, q, qd, s): return {torques}\n")
+    share, _ = score(
+        Arm.load(name), tmp_path / "c.py", f"def controller(t, q, qd, s): return {torques}\n"
+    )
     assert share < 0.2
 
 
@@ -38,7 +43,9 @@ def test_a_task_names_configurations_that_there_are(tmp_path):
     rubric = CheckRubric.from_dict({"controller": {"start": "raedy"}})
     with (
         Program(tmp_path / "c.py", RUN) as program,
-        pytest.raises(AnswerError, match=r"controller\.start: puma560 has no configuration 'raedy'"),
+        pytest.raises(
+            AnswerError, match=r"controller\.start: puma560 has no configuration 'raedy'"
+        ),
     ):
         check(PUMA, program, rubric, seed=1)
 
@@ -77,7 +84,9 @@ def ik(T):
     share, report = score(arm, tmp_path / "p.py", text)
     assert share == 1, str(report)
     there = text.replace("x, y = T[0][3], T[1][3]", "x, y = T[0][3] - 3.0, T[1][3]")
-    moved = arm.with_base(np.block([[np.eye(3), np.array([[3.0], [0], [0]])], [np.zeros((1, 3)), 1]]))
+    moved = arm.with_base(
+        np.block([[np.eye(3), np.array([[3.0], [0], [0]])], [np.zeros((1, 3)), 1]])
+    )
     share, report = score(moved, tmp_path / "m.py", there)
     assert share == 1, str(report)
 
@@ -85,14 +94,21 @@ def ik(T):
 @pytest.mark.parametrize("row", ["[float('nan')]*6", "[1.7e308]*6", "[float('inf')]*6"])
 def test_rows_that_are_no_numbers_make_a_pose_wrong(tmp_path, row):
     right = (Path(__file__).parents[2] / "docs/examples/puma_ik.py").read_text()
-    text = right.replace("def ik(T)", "def solved(T)") + f"\ndef ik(T): return [*map(list, solved(T)), {row}]\n"
-    _, report = score(PUMA, tmp_path / "n.py", text, rubric=CheckRubric.from_dict({"ik": {}}), samples=5)
+    text = (
+        right.replace("def ik(T)", "def solved(T)")
+        + f"\ndef ik(T): return [*map(list, solved(T)), {row}]\n"
+    )
+    _, report = score(
+        PUMA, tmp_path / "n.py", text, rubric=CheckRubric.from_dict({"ik": {}}), samples=5
+    )
     (closes, *_) = report.functions["ik"]
     assert closes.points == 0
 
 
 def test_many_rows_are_refused_and_judged_in_no_time(tmp_path):
-    share, report = score(Arm.load("planar2r"), tmp_path / "m.py", "def ik(T): return [[0, 0]]*65\n")
+    share, report = score(
+        Arm.load("planar2r"), tmp_path / "m.py", "def ik(T): return [[0, 0]]*65\n"
+    )
     assert share == 0
     assert "expected at most 64" in str(report)
 
@@ -128,17 +144,27 @@ os.write(4, b'{"functions":["fk"]}\\n{"id":1,"value":[[1' + b'0'*400 + b']]}\\n'
 time.sleep(1e6)
 """
     (tmp_path / "h.py").write_text(text)
-    with Program(tmp_path / "h.py", RUN) as program, pytest.raises(ProgramError, match="not an array of numbers"):
+    with (
+        Program(tmp_path / "h.py", RUN) as program,
+        pytest.raises(ProgramError, match="not an array of numbers"),
+    ):
         program.fk(np.zeros(2))
 
 
 def test_what_a_program_says_commands_no_terminal(tmp_path):
-    (tmp_path / "e.py").write_text('def fk(q): raise ValueError("\\x1b[2J\\x1b[H 200 of 200 points \\x9b8m\\u202e")\n')
+    (tmp_path / "e.py").write_text(
+        'def fk(q): raise ValueError("\\x1b[2J\\x1b[H 200 of 200 points \\x9b8m\\u202e")\n'
+    )
     with Program(tmp_path / "e.py", RUN) as program, pytest.raises(ProgramError) as error:
         program.fk(np.zeros(2))
     assert str(error.value).isprintable()
-    (tmp_path / "p.py").write_text('def fk(q):\n    import os; print("\\x1b[2J gone"); os._exit(1)\n')
-    with Program(tmp_path / "p.py", RUN) as program, pytest.raises(ProgramError, match="gone") as error:
+    (tmp_path / "p.py").write_text(
+        'def fk(q):\n    import os; print("\\x1b[2J gone"); os._exit(1)\n'
+    )
+    with (
+        Program(tmp_path / "p.py", RUN) as program,
+        pytest.raises(ProgramError, match="gone") as error,
+    ):
         program.fk(np.zeros(2))
     assert str(error.value).isprintable()
 

@@ -30,7 +30,13 @@ EXPECTED = {
 }
 """Points of fk and of the parts of ik, or between which they are; and what is said."""
 
-SLOW = {"raises out of reach", "wrist transposed", "sign of the elbow", "no shoulder offset", "slow"}
+SLOW = {
+    "raises out of reach",
+    "wrist transposed",
+    "sign of the elbow",
+    "no shoulder offset",
+    "slow",
+}
 
 
 @pytest.fixture(scope="module")
@@ -63,15 +69,25 @@ def test_ten_solutions_are_scored_as_a_teacher_would(name, puma, tmp_path):
 
 
 FORWARD = {
-    "theta's sign": ("link(i, q[i])", "link(i, -q[i])", "joint 1 (waist) is the first whose axis is wrong"),
-    "a3": ("a = [0, a2, a3, 0, 0, 0]", "a = [0, a2, -a3, 0, 0, 0]", "joint 4 (wrist_roll) is the first"),
+    "theta's sign": (
+        "link(i, q[i])",
+        "link(i, -q[i])",
+        "joint 1 (waist) is the first whose axis is wrong",
+    ),
+    "a3": (
+        "a = [0, a2, a3, 0, 0, 0]",
+        "a = [0, a2, -a3, 0, 0, 0]",
+        "joint 4 (wrist_roll) is the first",
+    ),
     "alpha1": ("alpha = [pi / 2, 0", "alpha = [-pi / 2, 0", "joint 2 (shoulder) is the first"),
     "d6": ("d = [d1, 0, d3, d4, 0, 0]", "d = [d1, 0, d3, d4, 0, 0.1]", "look at the last row"),
     "degrees": ("link(i, q[i])", "link(i, q[i] * pi / 180)", "given degrees"),
 }
 
 
-@pytest.mark.parametrize("name", [slow_if(name in {"a3", "theta's sign"}, name) for name in FORWARD])
+@pytest.mark.parametrize(
+    "name", [slow_if(name in {"a3", "theta's sign"}, name) for name in FORWARD]
+)
 def test_a_wrong_row_is_found(name, puma, tmp_path):
     old, new, said = FORWARD[name]
     text = solution("right").replace(old, new).split("def ik")[0]
@@ -81,7 +97,10 @@ def test_a_wrong_row_is_found(name, puma, tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    [slow_if(name != "cobra600", name) for name in ("cobra600", "planar2r", "panda", "stanford", "ur5")],
+    [
+        slow_if(name != "cobra600", name)
+        for name in ("cobra600", "planar2r", "panda", "stanford", "ur5")
+    ],
 )
 def test_our_own_kinematics_get_full_marks(name, tmp_path):
     text = (
@@ -117,7 +136,10 @@ def test_a_controller_is_scored_by_its_error(puma, tmp_path):
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_report(puma, tmp_path):
-    first, again = (checked(puma, solution("one branch"), tmp_path, samples=10, rubric=PATIENT) for _ in range(2))
+    first, again = (
+        checked(puma, solution("one branch"), tmp_path, samples=10, rubric=PATIENT)
+        for _ in range(2)
+    )
     assert [p.points for p in first.functions["ik"]] == [p.points for p in again.functions["ik"]]
     assert (
         checked(puma, solution("right"), tmp_path, seed=None, samples=1).seed
@@ -129,7 +151,9 @@ def test_the_command_and_its_status(tmp_path, capsys):
     (tmp_path / "right.py").write_text(solution("right"))
     (tmp_path / "degrees.py").write_text(solution("degrees"))
     (tmp_path / "broken.py").write_text("def fk(q)\n")
-    (tmp_path / "rubric.toml").write_text("[ik]\nbranches = 40\ncloses = 60\nsingular = 0\ntime = 0\n")
+    (tmp_path / "rubric.toml").write_text(
+        "[ik]\nbranches = 40\ncloses = 60\nsingular = 0\ntime = 0\n"
+    )
     (tmp_path / "wrong.toml").write_text("[ik]\nbranch = 40\n")
 
     def run(*arguments):
@@ -140,13 +164,26 @@ def test_the_command_and_its_status(tmp_path, capsys):
     status, out, _ = run(str(tmp_path / "right.py"), "--samples", "10", "--seed", "3")
     assert status == 0 and "200 of 200 points" in out and "seed 3" in out
     status, out, _ = run(
-        str(tmp_path / "degrees.py"), "--samples", "10", "--json", "--rubric", str(tmp_path / "rubric.toml")
+        str(tmp_path / "degrees.py"),
+        "--samples",
+        "10",
+        "--json",
+        "--rubric",
+        str(tmp_path / "rubric.toml"),
     )
     report = json.loads(out)
-    assert status == 1 and report["most"] == 100 and report["points"] == 0 and list(report["functions"]) == ["ik"]
+    assert (
+        status == 1
+        and report["most"] == 100
+        and report["points"] == 0
+        and list(report["functions"]) == ["ik"]
+    )
     status, _, err = run(str(tmp_path / "broken.py"))
     # Without bubblewrap, a line before it says that programs are not isolated.
-    assert status == 2 and err.splitlines()[-1] == "dhkit: broken.py: line 1: SyntaxError: expected ':'"
+    assert (
+        status == 2
+        and err.splitlines()[-1] == "dhkit: broken.py: line 1: SyntaxError: expected ':'"
+    )
     status, _, err = run(str(tmp_path / "right.py"), "--rubric", str(tmp_path / "wrong.toml"))
     assert status == 2 and "ik.branch" in err and err.count("\n") == 1
     status, _, err = run(str(tmp_path / "missing.py"))
@@ -165,7 +202,9 @@ def test_a_controller_is_scored_on_an_arm_whose_configurations_are_one_state(tmp
     arm = Arm.load("puma560_cao")
     assert np.array_equal(arm.configurations["ready"], np.zeros(6))
     source = tmp_path / "still.py"
-    source.write_text("import numpy as np\ndef controller(t, q, qd, setpoint):\n    return np.zeros(6)\n")
+    source.write_text(
+        "import numpy as np\ndef controller(t, q, qd, setpoint):\n    return np.zeros(6)\n"
+    )
     with Program(source) as program:
         (part,) = check(arm, program, seed=1).functions["controller"]
     assert part.points == 0
@@ -176,7 +215,8 @@ def test_branches_are_counted_of_all_poses_and_not_of_those_that_were_tried(tmp_
     right = (Path(__file__).parents[2] / "docs/examples/puma_ik.py").read_text()
     source = tmp_path / "few.py"
     source.write_text(
-        right.replace("def ik(T)", "def solved(T)") + "\ndef ik(T): return solved(T) if T[0][3] > 0.5 else []\n"
+        right.replace("def ik(T)", "def solved(T)")
+        + "\ndef ik(T): return solved(T) if T[0][3] > 0.5 else []\n"
     )
     with Program(source) as program:
         _, branches, *_ = check(Arm.load("puma560"), program, seed=3, samples=40).functions["ik"]
@@ -187,8 +227,13 @@ def test_branches_are_counted_of_all_poses_and_not_of_those_that_were_tried(tmp_
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        slow_if(True, "import numpy as np\ndef fk(q): return np.eye(4)\n", "the same pose for every q"),
-        ("def fk(q): return [[round(x, 4) for x in row] for row in right(q)]\n", "are its numbers rounded"),
+        slow_if(
+            True, "import numpy as np\ndef fk(q): return np.eye(4)\n", "the same pose for every q"
+        ),
+        (
+            "def fk(q): return [[round(x, 4) for x in row] for row in right(q)]\n",
+            "are its numbers rounded",
+        ),
         (
             "def fk(q): return [[-r[0], *r[1:]] if k < 3 else r for k, r in enumerate(right(q))]\n",
             "is not a rotation",
@@ -197,7 +242,11 @@ def test_branches_are_counted_of_all_poses_and_not_of_those_that_were_tried(tmp_
     ],
 )
 def test_what_is_wrong_with_any_pose_is_said_before_an_axis_is_blamed(tmp_path, text, hint):
-    own = (Path(__file__).parents[2] / "docs/examples/puma_ik.py").read_text().replace("def fk(", "def right(")
+    own = (
+        (Path(__file__).parents[2] / "docs/examples/puma_ik.py")
+        .read_text()
+        .replace("def fk(", "def right(")
+    )
     (tmp_path / "fk.py").write_text(own.replace("def ik(", "def solved(") + "\n" + text)
     with Program(tmp_path / "fk.py") as program:
         (part,) = check(Arm.load("puma560"), program, seed=1, samples=20).functions["fk"]
@@ -206,12 +255,19 @@ def test_what_is_wrong_with_any_pose_is_said_before_an_axis_is_blamed(tmp_path, 
 
 
 def test_points_fall_from_the_bound_to_ten_times_it():
-    assert [share_within(value, 0.1) for value in (0.0, 0.1, 1.0, 2.0, np.inf)] == [1.0, 1.0, 0.0, 0.0, 0.0]
+    assert [share_within(value, 0.1) for value in (0.0, 0.1, 1.0, 2.0, np.inf)] == [
+        1.0,
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+    ]
     assert share_within(0.3, 0.1) == pytest.approx(1 - np.log10(3))
 
 
 @pytest.mark.parametrize(
-    ("unit", "factor"), [slow_if(True, "mm", 1000), slow_if(True, "cm", 100), ("inches", 1 / 0.0254)]
+    ("unit", "factor"),
+    [slow_if(True, "mm", 1000), slow_if(True, "cm", 100), ("inches", 1 / 0.0254)],
 )
 def test_other_units_of_length_are_named(unit, factor, tmp_path):
     arm = Arm.load("planar2r")

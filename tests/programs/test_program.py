@@ -20,7 +20,12 @@ import dhkit.arm
 from acceptance import ACCEPTING
 from conftest import require
 from dhkit import Arm
-from dhkit.execution import child as child_module, isolated_commands, isolation as isolation_module, other_user
+from dhkit.execution import (
+    child as child_module,
+    isolated_commands,
+    isolation as isolation_module,
+    other_user,
+)
 from dhkit.execution.bubblewrap import package_paths
 from dhkit.execution.isolation import Isolation, IsolationError, Kind, find_isolation
 from dhkit.execution.process import Failure, Limits, ProgramError
@@ -33,7 +38,15 @@ from waiting import HANGS, wait_for
 NAMED = "DHKIT_TEST_PROCESS"
 LIMITS = Limits(seconds=1.0, memory=400 << 20)
 SLEEPERS = "stops itself", "ignores signals"
-VIOLENT = "allocates", "crashes", "is a fork bomb", "floods", "closes its answers", "stops itself", "ignores signals"
+VIOLENT = (
+    "allocates",
+    "crashes",
+    "is a fork bomb",
+    "floods",
+    "closes its answers",
+    "stops itself",
+    "ignores signals",
+)
 """After these a program is started anew; after all of them another one runs on."""
 UNPROTECTED = Isolation(Kind.NONE, "as a test wants it")
 isolated = pytest.mark.skipif(not find_isolation(), reason=f"{find_isolation()}")
@@ -83,7 +96,9 @@ def left():
     found = []
     for process in psutil.Process().children(recursive=True):
         with suppress(psutil.Error):
-            if process.status() != psutil.STATUS_ZOMBIE and any("_runner." in word for word in process.cmdline()):
+            if process.status() != psutil.STATUS_ZOMBIE and any(
+                "_runner." in word for word in process.cmdline()
+            ):
                 found.append(process)
     return found
 
@@ -136,7 +151,9 @@ def test_harm_is_said_and_other_programs_run(name, program, neighbour):
 @pytest.mark.parametrize("name", LEFT_BEHIND)
 def test_what_it_starts_ends_with_it(name, program):
     one = program(LEFT_BEHIND[name])
-    with suppress(ProgramError):  # who kills the first process of his root ends himself, perhaps before he has answered
+    with suppress(
+        ProgramError
+    ):  # who kills the first process of his root ends himself, perhaps before he has answered
         assert one.call("fk", q=[1.0]) == 1.0
 
 
@@ -162,7 +179,9 @@ def test_many_lines_are_read_and_their_end_is_kept(program):
     text = f"def fk(q):\n    for k in range({last}):\n        print(k)\n    return 1.0\n"
     one = program(text, limits=Limits(60.0))
     assert one.call("fk", q=[1.0]) == 1.0
-    wait_for(lambda: one.output.endswith(f"{last - 1}\n"), "the end of the output")  # it has a pipe of its own
+    wait_for(
+        lambda: one.output.endswith(f"{last - 1}\n"), "the end of the output"
+    )  # it has a pipe of its own
     assert len(one.output) < 100_000
 
 
@@ -250,7 +269,9 @@ def test_allowed_packages_are_there_and_others_are_not(program):
 
 
 def test_who_imports_dhkit_openly_is_reported(program):
-    one = program("import dhkit\ndef fk(q):\n    return 1\n", limits=Limits(20.0), isolation=UNPROTECTED)
+    one = program(
+        "import dhkit\ndef fk(q):\n    return 1\n", limits=Limits(20.0), isolation=UNPROTECTED
+    )
     one.call("fk", q=[1.0])
     assert one.imported == ("dhkit",)
 
@@ -279,11 +300,16 @@ def open_folder():
 SYSTEM_PYTHON = f"/usr/bin/python3.{sys.version_info.minor}"
 
 
-@pytest.mark.skipif(os.geteuid() != 0 or not Path(SYSTEM_PYTHON).exists(), reason="only root runs it as another user")
+@pytest.mark.skipif(
+    os.geteuid() != 0 or not Path(SYSTEM_PYTHON).exists(),
+    reason="only root runs it as another user",
+)
 def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, open_folder, monkeypatch):
     monkeypatch.setattr(sys, "_base_executable", SYSTEM_PYTHON)
     # The checkout may lie where no other user may enter.
-    packages = {open_folder / path.name: inside for path, inside in package_paths(("numpy",)).items()}
+    packages = {
+        open_folder / path.name: inside for path, inside in package_paths(("numpy",)).items()
+    }
     for path in package_paths(("numpy",)):
         copytree(path, open_folder / path.name, ignore=ignore_patterns("tests"))
     monkeypatch.setattr(isolated_commands, "package_paths", lambda names: packages)
@@ -335,7 +361,9 @@ def fk(q):
         files.append(file)
 """
 IN_MEMORY = FILLS_FILES_WITHOUT_A_NAME.format(new='os.memfd_create("file")')
-DELETED = FILLS_FILES_WITHOUT_A_NAME.format(new='os.open("file", os.O_RDWR | os.O_CREAT); os.unlink("file")')
+DELETED = FILLS_FILES_WITHOUT_A_NAME.format(
+    new='os.open("file", os.O_RDWR | os.O_CREAT); os.unlink("file")'
+)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="files without a name are found in /proc")
@@ -418,7 +446,9 @@ def fk(q):
 @pytest.mark.slow
 def test_all_calls_together_are_limited_by_processor_time(program, monkeypatch):
     monkeypatch.setattr("dhkit.programs.caller.BOUNDS", replace(BOUNDS, time=0.5))
-    monkeypatch.setattr("dhkit.programs.caller.WAITING_FACTOR", HANGS)  # of the clock, on a busy machine
+    monkeypatch.setattr(
+        "dhkit.programs.caller.WAITING_FACTOR", HANGS
+    )  # of the clock, on a busy machine
     busy = program(BUSY)
     caller = Caller(busy, "fk")
     with pytest.raises(ProgramError, match="not called any more"):
@@ -426,4 +456,6 @@ def test_all_calls_together_are_limited_by_processor_time(program, monkeypatch):
             caller(np.zeros(2))
     assert 1 < len(caller.seconds) < 10
     assert busy.processor_time > 0.5
-    assert caller.failure_texts() == ("scoring took longer than 0.5 s: not called any more (1 time)",)
+    assert caller.failure_texts() == (
+        "scoring took longer than 0.5 s: not called any more (1 time)",
+    )

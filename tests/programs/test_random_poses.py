@@ -10,7 +10,12 @@ from dhkit.kinematics import classify, singular_values
 from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.caller import Caller
 from dhkit.programs.inverse import SOLUTION_ORDERS
-from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
+from dhkit.programs.random_poses import (
+    poses_out_of_reach,
+    random_states,
+    regular_states,
+    singular_states,
+)
 
 
 @pytest.mark.parametrize("name", ["puma560", "planar2r", "panda", "scara"])

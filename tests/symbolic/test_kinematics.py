@@ -38,8 +38,12 @@ def test_matrices_are_the_arms(name, symbols):
 def test_base_tool_and_arms_without_bodies():
     from dhkit import pose
 
-    arm = Arm.from_dh([(0.3, 0.2, "l", 0.7), ("pi/6", 0.1, 0, "-pi/4")], kinds="RP", parameters={"l": 0.4})
-    arm = arm.with_base(pose((0.1, 0.2, 0.3), euler=(0.3, 0.2, 0.1))).with_tool(pose((0, 0, 0.1), euler=(0, 0.5, 0)))
+    arm = Arm.from_dh(
+        [(0.3, 0.2, "l", 0.7), ("pi/6", 0.1, 0, "-pi/4")], kinds="RP", parameters={"l": 0.4}
+    )
+    arm = arm.with_base(pose((0.1, 0.2, 0.3), euler=(0.3, 0.2, 0.1))).with_tool(
+        pose((0, 0, 0.1), euler=(0, 0.5, 0))
+    )
     q = states(arm)
     assert np.abs(arm.symbolic.T.evaluate(q) - arm.fk(q)).max() < CLOSE
     assert np.abs(arm.symbolic.J.evaluate(q) - arm.jacobian(q)).max() < CLOSE
@@ -51,7 +55,11 @@ def test_text_reads_back(name):
     (q,) = states(arm, 1)
     values = {f"q{i + 1}": number(float(x)) for i, x in enumerate(q)}
     values |= {k: number(v) for k, v in arm.symbolic.constants.items()}
-    lines = [line for line in arm.symbolic.T.text().replace("\n      ", " ").splitlines() if line.startswith("T")]
+    lines = [
+        line
+        for line in arm.symbolic.T.text().replace("\n      ", " ").splitlines()
+        if line.startswith("T")
+    ]
     where = arm.symbolic.T.text().replace("\n      ", " ").partition("where ")[2].splitlines()[0]
     for angle in where.split(", "):
         head, _, body = angle.partition(" = ")
@@ -92,7 +100,19 @@ def test_c_gives_the_numbers(tmp_path):
     (tmp_path / "k.c").write_text(arm.symbolic.code("T,J", "c"))
     library = tmp_path / "k.so"
     subprocess.run(
-        ["gcc", "-std=c99", "-Wall", "-Werror", "-shared", "-fPIC", "-o", library, tmp_path / "k.c", "-lm"], check=True
+        [
+            "gcc",
+            "-std=c99",
+            "-Wall",
+            "-Werror",
+            "-shared",
+            "-fPIC",
+            "-o",
+            library,
+            tmp_path / "k.c",
+            "-lm",
+        ],
+        check=True,
     )
     code, (q,) = ctypes.CDLL(str(library)), states(arm, 1)
     T, J = np.empty((4, 4)), np.empty((6, 6))
@@ -109,14 +129,18 @@ def test_what_is_printed():
     assert "A1_12 = -s1" in str(kinematics.A(1))
     assert r"A_{1} = \begin{pmatrix}" in kinematics.A(1).latex()
     assert r"J(q) = \begin{pmatrix}" in kinematics.J._repr_latex_()
-    assert r"(A_{2})_{11}" in Arm.load("al5d").symbolic.latex("A") or r"A_{2} =" in Arm.load("al5d").symbolic.latex("A")
+    assert r"(A_{2})_{11}" in Arm.load("al5d").symbolic.latex("A") or r"A_{2} =" in Arm.load(
+        "al5d"
+    ).symbolic.latex("A")
     assert "function T = planar2r_T(q, p)" in kinematics.code("T", "matlab")
     assert repr(kinematics.T) == "<T of planar2r, shape (4, 4)>"
     assert list(kinematics.sympy()) == ["A1", "A2", "T", "J"]
     for wrong in (0, 3, "1", 1.5):
         with pytest.raises(ValueError, match="expected a link from 1 to 2"):
             kinematics.A(wrong)
-    with pytest.raises(ValueError, match=r"no quantity 'M'; expected some of A, A1 \.\.\. A2, T, J"):
+    with pytest.raises(
+        ValueError, match=r"no quantity 'M'; expected some of A, A1 \.\.\. A2, T, J"
+    ):
         kinematics.text("M")
     with pytest.raises(ValueError, match="language is 'rust'"):
         kinematics.code("T", "rust")

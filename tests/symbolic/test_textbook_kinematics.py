@@ -53,8 +53,12 @@ def check(description, symbols="file"):
     derived, q = derive_kinematics(description, symbols=symbols), states(description)
     A = derived.arm.evaluate(np.array(derived.A), q)
     np.testing.assert_allclose(A, link_transforms(description, q), atol=ROUNDING)
-    np.testing.assert_allclose(derived.arm.evaluate(derived.T, q), world_to_tool(description, q), atol=ROUNDING)
-    np.testing.assert_allclose(derived.arm.evaluate(derived.J, q), jacobian(description, q), atol=ROUNDING)
+    np.testing.assert_allclose(
+        derived.arm.evaluate(derived.T, q), world_to_tool(description, q), atol=ROUNDING
+    )
+    np.testing.assert_allclose(
+        derived.arm.evaluate(derived.J, q), jacobian(description, q), atol=ROUNDING
+    )
 
 
 @pytest.mark.parametrize("name", robots())
@@ -119,7 +123,9 @@ def test_every_mistake_changes_something(mistake):
     assert "J" in found or mistake in ("theta_sin_cos", "pose_inverted")
     assert ("T" in found) == (mistake not in JACOBIAN_MISTAKES)
     in_product = {"translations_unrotated", *POSE_MISTAKES} - {"convention_exchanged"}
-    assert ("A" in found) == (mistake in LINK_MISTAKES.keys() | {"convention_exchanged"} and mistake not in in_product)
+    assert ("A" in found) == (
+        mistake in LINK_MISTAKES.keys() | {"convention_exchanged"} and mistake not in in_product
+    )
 
 
 @pytest.mark.parametrize("mistake", sorted(LINK_MISTAKES))

@@ -21,7 +21,11 @@ STANDARD_DH = [  # d, a [m], alpha [deg]: Corke & Armstrong-Helouvry 1994, frame
     (0.0, 0.0, -90),
     (0.0, 0.0, 0),
 ]
-POSES = {"zero": (0, 0, 0, 0, 0, 0), "ready": (0, 90, -90, 0, 0, 0), "nominal": (0, 45, 180, 0, 45, 0)}
+POSES = {
+    "zero": (0, 0, 0, 0, 0, 0),
+    "ready": (0, 90, -90, 0, 0, 0),
+    "nominal": (0, 45, 180, 0, 45, 0),
+}
 CENTRES_OF_MASS = {  # m, link frames: Corke & Armstrong-Helouvry 1994; none is published for link 1
     "upper_arm": (-0.3638, 0.006, 0.2275),
     "forearm": (-0.0203, -0.0141, 0.070),
@@ -57,7 +61,15 @@ def overlap(one: trimesh.Trimesh, other: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def test_links_are_named_from_the_base_to_the_flange():
-    assert NAMES == ["base", "shoulder", "upper_arm", "forearm", "wrist_roll", "wrist_pitch", "flange"]
+    assert NAMES == [
+        "base",
+        "shoulder",
+        "upper_arm",
+        "forearm",
+        "wrist_roll",
+        "wrist_pitch",
+        "flange",
+    ]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -53,9 +53,13 @@ MOTIONS = {
     "quintic": lambda duration: ARM.quintic([0, 0], [1, 1], duration),
     "cubic": lambda duration: ARM.cubic([0, 0], [1, 1], duration),
     "trapezoidal": lambda duration: ARM.trapezoidal([0, 0], [1, 1], duration),
-    "straight_line": lambda duration: ARM.straight_line(ARM.fk([0.1, 0.9]), ARM.fk([0.3, 0.9]), [0.1, 0.9], duration),
+    "straight_line": lambda duration: ARM.straight_line(
+        ARM.fk([0.1, 0.9]), ARM.fk([0.3, 0.9]), [0.1, 0.9], duration
+    ),
     "plan": lambda duration: ARM.plan([0, 0], [1, 1], duration=duration, intervals=16),
-    "plan, effort": lambda duration: ARM.plan([0, 0], [1, 1], "effort", duration=duration, intervals=16),
+    "plan, effort": lambda duration: ARM.plan(
+        [0, 0], [1, 1], "effort", duration=duration, intervals=16
+    ),
     "plan_path": lambda duration: ARM.plan_path(
         JointPath.straight(ARM.description, [0, 0], [1, 1]), "effort", duration=duration
     ),
@@ -66,7 +70,9 @@ MOTIONS = {
 @pytest.mark.parametrize("name", MOTIONS)
 @pytest.mark.parametrize("duration", [1e300, 1e-300, 0, -1.0, np.inf, np.nan, "2"])
 def test_a_duration_that_is_none_is_refused_in_one_line(name, duration, capfd):
-    with pytest.raises((ValueError, TypeError), match=r"duration is .*; expected 1e-06 to 1e\+06 s"):
+    with pytest.raises(
+        (ValueError, TypeError), match=r"duration is .*; expected 1e-06 to 1e\+06 s"
+    ):
         MOTIONS[name](duration)
     assert capfd.readouterr() == ("", "")
 

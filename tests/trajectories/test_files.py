@@ -126,30 +126,48 @@ def test_a_table_of_an_unknown_robot_asks_for_it(suffix, tmp_path):
     arm = with_payload(PUMA, 1)
     motion = cubic(arm, np.zeros(6), np.ones(6) / 10, duration=0.1)
     path = motion.save(tmp_path / f"motion{suffix}")
-    with pytest.raises(DescriptionError, match=r"its robot puma560 \(.*\) is not the library's; give the robot"):
+    with pytest.raises(
+        DescriptionError, match=r"its robot puma560 \(.*\) is not the library's; give the robot"
+    ):
         Trajectory.load(path)
     assert Trajectory.load(path, arm).description is arm
 
 
-GOOD = {"format": "dhkit trajectory 1", "robot": "planar2r", "digest": ARM.digest, "content": "0" * 16}
+GOOD = {
+    "format": "dhkit trajectory 1",
+    "robot": "planar2r",
+    "digest": ARM.digest,
+    "content": "0" * 16,
+}
 
 
 def values(**changed):
     from dhkit.description import to_toml
 
-    base = {**GOOD, "toml": to_toml(ARM), "breaks": np.array([0.0, 1.0]), "coefficients": np.ones((1, 2, 2))}
+    base = {
+        **GOOD,
+        "toml": to_toml(ARM),
+        "breaks": np.array([0.0, 1.0]),
+        "coefficients": np.ones((1, 2, 2)),
+    }
     return {key: value for key, value in {**base, **changed}.items() if value is not None}
 
 
 BAD_VALUES = [
     ({"breaks": None}, r"no breaks in it: found .*; expected a trajectory that dhkit saved"),
-    ({"format": "dhkit trajectory 9"}, r"format is 'dhkit trajectory 9'; expected 'dhkit trajectory 1'"),
+    (
+        {"format": "dhkit trajectory 9"},
+        r"format is 'dhkit trajectory 9'; expected 'dhkit trajectory 1'",
+    ),
     ({"digest": "0" * 12}, r"its robot is not the 'planar2r' that it names; the file is damaged"),
     ({"robot": "puma560"}, r"its robot is not the 'puma560' that it names"),
     ({"toml": "format = 1\nname = "}, r"its robot"),
     ({"breaks": np.array([0.0, -1.0])}, r"breaks do not increase"),
     ({"breaks": np.array([0.0, np.nan])}, r"breaks has nan"),
-    ({"coefficients": np.ones((1, 2, 3))}, r"coefficients has shape \(1, 2, 3\); expected \(1, p\+1, 2\)"),
+    (
+        {"coefficients": np.ones((1, 2, 3))},
+        r"coefficients has shape \(1, 2, 3\); expected \(1, p\+1, 2\)",
+    ),
     ({"coefficients": np.full((1, 2, 2), np.inf)}, r"coefficients has inf"),
     ({"content": None}, r"no content in it"),
     ({}, r"its numbers differ from those that were written; the file is damaged"),
@@ -210,11 +228,18 @@ def test_bombs_are_not_unpacked(tmp_path):
 
 def test_headers_that_promise_too_much_are_refused(tmp_path):
     member = io.BytesIO()
-    np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": (10**9, 10**9, 2)})
+    np.lib.format.write_array_header_1_0(
+        member, {"descr": "<f8", "fortran_order": False, "shape": (10**9, 10**9, 2)}
+    )
     path = tmp_path / "bad.npz"
-    with zipfile.ZipFile(path, "w") as archive, zipfile.ZipFile(io.BytesIO(npz_bytes(values()))) as good:
+    with (
+        zipfile.ZipFile(path, "w") as archive,
+        zipfile.ZipFile(io.BytesIO(npz_bytes(values()))) as good,
+    ):
         for name in good.namelist():
-            archive.writestr(name, member.getvalue() if name == "coefficients.npy" else good.read(name))
+            archive.writestr(
+                name, member.getvalue() if name == "coefficients.npy" else good.read(name)
+            )
     refused(path, r"coefficients: 0 bytes for shape .*; the file is damaged")
 
 
@@ -229,7 +254,9 @@ def test_no_file_and_no_trajectory_are_named(suffix, tmp_path):
 
 def test_other_suffixes_are_named(tmp_path):
     motion = continuous_motion(ARM)
-    with pytest.raises(ValueError, match=r"found suffix '.json'; expected one of .npz, .mat, .csv, .yaml, .yml"):
+    with pytest.raises(
+        ValueError, match=r"found suffix '.json'; expected one of .npz, .mat, .csv, .yaml, .yml"
+    ):
         motion.save(tmp_path / "motion.json")
     refused(tmp_path / "motion", r"found suffix ''")
     with pytest.raises(ValueError, match=r"rate is 10: .npz holds no samples"):
@@ -255,11 +282,17 @@ def test_a_file_whose_motion_jumps_is_refused(suffix, order, what, tmp_path):
     coefficients = np.zeros((2, 4, 2))
     coefficients[1, order, 1] = 1e-3
     Trajectory(arm, [0.0, 1.0, 2.0], coefficients).save(tmp_path / f"jump{suffix}")
-    with pytest.raises(DescriptionError, match=rf"jump\{suffix}: joint 2: its {what} jumps from 0 to 0.001 at 1 s"):
+    with pytest.raises(
+        DescriptionError, match=rf"jump\{suffix}: joint 2: its {what} jumps from 0 to 0.001 at 1 s"
+    ):
         Trajectory.load(tmp_path / f"jump{suffix}")
 
 
-LOADS = [Payload(2.0, (0.01, 0.0, 0.05)), Payload(1.5, (0, 0, 0.1), np.diag([0.01, 0.02, 0.025])), Payload(0.3)]
+LOADS = [
+    Payload(2.0, (0.01, 0.0, 0.05)),
+    Payload(1.5, (0, 0, 0.1), np.diag([0.01, 0.02, 0.025])),
+    Payload(0.3),
+]
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".mat", ".csv", ".yaml"])
@@ -272,7 +305,9 @@ def test_payload_and_friction_stand_in_the_file(suffix, payload, friction, tmp_p
     assert again.description is PUMA
     t = np.linspace(0, 0.4, 9)[1:-1]
     loaded = payload.carried(PUMA)
-    expected = inverse_dynamics(loaded, motion.q(t), motion.qd(t), motion.qdd(t), friction=friction or False)
+    expected = inverse_dynamics(
+        loaded, motion.q(t), motion.qd(t), motion.qdd(t), friction=friction or False
+    )
     assert np.abs(again.tau(t) - expected).max() < 1e-5
 
 

@@ -6,12 +6,26 @@ import pytest
 from dhkit.description import library_robot, pose, world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.kinematics import inverse_kinematics
-from dhkit.trajectories import Limits, circle, joint_path, least_slowdown, straight_line, tool_circle, tool_line
+from dhkit.trajectories import (
+    Limits,
+    circle,
+    joint_path,
+    least_slowdown,
+    straight_line,
+    tool_circle,
+    tool_line,
+)
 
 PROMISED = 1e-7  # m and rad
 REQUIRED = 1e-6
 NUMERIC = 1e-6
-WHOLE = {"puma560": "nominal", "ur5": "nominal", "panda": "ready", "cobra600": "nominal", "stanford": "nominal"}
+WHOLE = {
+    "puma560": "nominal",
+    "ur5": "nominal",
+    "panda": "ready",
+    "cobra600": "nominal",
+    "stanford": "nominal",
+}
 PUMA, ARM = library_robot("puma560"), library_robot("planar2r")
 
 
@@ -31,8 +45,19 @@ def off(arm, q, T):
     """Return how far the tool is off, m or rad, at the worst."""
     found = world_to_tool(arm, q)
     turn = np.swapaxes(found[:, :3, :3], 1, 2) @ T[:, :3, :3]
-    skew = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]]) / 2
-    return max(np.linalg.norm((found - T)[:, :3, 3], axis=1).max(), np.linalg.norm(skew, axis=0).max())
+    skew = (
+        np.stack(
+            [
+                turn[:, 2, 1] - turn[:, 1, 2],
+                turn[:, 0, 2] - turn[:, 2, 0],
+                turn[:, 1, 0] - turn[:, 0, 1],
+            ]
+        )
+        / 2
+    )
+    return max(
+        np.linalg.norm((found - T)[:, :3, 3], axis=1).max(), np.linalg.norm(skew, axis=0).max()
+    )
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -71,7 +96,9 @@ def test_derivatives_at_knots_are_those_of_neighbouring_knots(name):
     s = np.linspace(0, 1, 801)
     spline = CubicSpline(s, path.q(s))
     assert np.abs(spline(s, 1) - path.qs(s))[5:-5].max() < NUMERIC
-    jumps = path.qss(path.breaks[1:-1]) - path.pieces.derivative.derivative(path.breaks[1:-1], "left")
+    jumps = path.qss(path.breaks[1:-1]) - path.pieces.derivative.derivative(
+        path.breaks[1:-1], "left"
+    )
     assert np.abs(jumps).max() < 1e-9 * max(1, np.abs(path.qss(s)).max())
 
 
@@ -99,7 +126,9 @@ def test_a_line_out_of_reach_is_named():
     T0 = world_to_tool(ARM, [0.3, 0.8])
     T1 = T0.copy()
     T1[:3, 3] *= 2
-    with pytest.raises(PlanningError, match=r"the path leaves the workspace at s = 0\.\d+, the tool at \(.*\) m"):
+    with pytest.raises(
+        PlanningError, match=r"the path leaves the workspace at s = 0\.\d+, the tool at \(.*\) m"
+    ):
         straight_line(ARM, T0, T1, [0.3, 0.8])
     with pytest.raises(PlanningError, match=r"planar2r does not reach the path's first pose"):
         straight_line(ARM, T1, T0)
@@ -110,7 +139,9 @@ def test_a_line_on_which_a_branch_ends_is_named():
     arm = library_robot("kr5")
     q = np.array([[-1.56, -0.44, 1.87, 1.58, -1.47, 0.29], [-1.77, -0.55, 1.56, 1.25, -1.08, 0.17]])
     T0, T1 = world_to_tool(arm, q)
-    with pytest.raises(PlanningError, match="the path meets a singularity, and only a jump leads on, at s = ") as error:
+    with pytest.raises(
+        PlanningError, match="the path meets a singularity, and only a jump leads on, at s = "
+    ) as error:
         straight_line(arm, T0, T1, q[0])
     end = float(str(error.value).split("s = ")[1].split(",")[0])
     beside = tool_line(T0, T1).poses(np.array([end - 0.01, end + 0.01]))
@@ -144,7 +175,9 @@ def test_a_joint_limit_along_the_path_is_named():
     arm, q = start_of("cobra600")
     T0, T1 = a_line(arm, q)
     T1[2, 3] = T0[2, 3] + 0.2  # its quill moves downwards
-    with pytest.raises(PlanningError, match=r"quill leaves its limit, 0 m, along the path: it comes to -0.1 m"):
+    with pytest.raises(
+        PlanningError, match=r"quill leaves its limit, 0 m, along the path: it comes to -0.1 m"
+    ):
         straight_line(arm, T0, T1, q)
 
 
@@ -152,7 +185,9 @@ def test_an_orientation_that_the_arm_has_not_is_named():
     arm, q = start_of("cobra600")
     T0 = world_to_tool(arm, q)
     T1 = T0 @ pose(euler=[0.3, 0, 0])
-    with pytest.raises(PlanningError, match="the arm cannot turn its tool as the path asks at s = "):
+    with pytest.raises(
+        PlanningError, match="the arm cannot turn its tool as the path asks at s = "
+    ):
         straight_line(arm, T0, T1, q)
 
 

@@ -13,7 +13,12 @@ ARM = library_robot("planar2r")
 
 def test_a_robots_limits_are_its_numbers():
     limits, numbers = Limits.of(ARM), ARM.numbers
-    for ours, theirs in (("lower", "lower"), ("upper", "upper"), ("velocity", "velocity"), ("torque", "effort")):
+    for ours, theirs in (
+        ("lower", "lower"),
+        ("upper", "upper"),
+        ("velocity", "velocity"),
+        ("torque", "effort"),
+    ):
         assert np.array_equal(getattr(limits, ours), getattr(numbers, theirs))
     assert np.isinf(limits.acceleration).all()
     assert np.isinf(limits.jerk).all()

@@ -16,7 +16,9 @@ from file_checks import check_damaged, check_refused
 ARM, COBRA = library_robot("planar2r"), library_robot("cobra600")
 T = np.array([5.0, 5.5, 6.0, 7.0])
 Q, QD, QDD = np.random.default_rng(0).uniform(-1, 1, (3, 4, 2))
-EXPORT = r"save arrays by save\('log.mat', 't', 'q', '-v7'\), a timeseries ts as \[ts.Time, ts.Data\]"
+EXPORT = (
+    r"save arrays by save\('log.mat', 't', 'q', '-v7'\), a timeseries ts as \[ts.Time, ts.Data\]"
+)
 
 
 def read(folder, values, arm=ARM, packed=False, **options):
@@ -37,7 +39,14 @@ AS_SAVED = {
     "both": {"t": T, "q": timed(Q)},
     "vectors": {"t": T, "q1": Q[:, 0], "q2": Q[:, 1, None]},
     "the joints' names": {"t": T, "Shoulder": Q[:, 0], "elbow": Q[:, 1]},
-    "more than is needed": {"t": T, "q": Q, "Q": np.eye(6), "gains": {"kp": 1.0}, "note": "run 7", "names": ["a", "b"]},
+    "more than is needed": {
+        "t": T,
+        "q": Q,
+        "Q": np.eye(6),
+        "gains": {"kp": 1.0},
+        "note": "run 7",
+        "names": ["a", "b"],
+    },
     "single precision": {"t": T, "q": Q.astype(np.float32)},
 }
 
@@ -65,7 +74,14 @@ def test_rates_and_accelerations_are_used_where_they_are(names, as_matrices, tmp
 
 
 def test_names_are_mapped(tmp_path):
-    logged = {"clock": T, "simout": Q, "rates": QD, "a1": Q[:, 0], "a2": Q[:, 1], "q": np.zeros((4, 2))}
+    logged = {
+        "clock": T,
+        "simout": Q,
+        "rates": QD,
+        "a1": Q[:, 0],
+        "a2": Q[:, 1],
+        "q": np.zeros((4, 2)),
+    }
     expected = Trajectory.from_samples(ARM, T, Q)
     assert read(tmp_path, logged, columns={"t": "clock", "q": "simout"}) == expected
     assert read(tmp_path, logged, columns={"t": "CLOCK", "shoulder": "a1", "q2": "a2"}) == expected
@@ -74,7 +90,9 @@ def test_names_are_mapped(tmp_path):
 
 
 def test_names_may_be_exchanged(tmp_path):
-    motion = read(tmp_path, {"t": T, "q1": Q[:, 1], "q2": Q[:, 0]}, columns={"q1": "q2", "q2": "q1"})
+    motion = read(
+        tmp_path, {"t": T, "q1": Q[:, 1], "q2": Q[:, 0]}, columns={"q1": "q2", "q2": "q1"}
+    )
     assert motion == Trajectory.from_samples(ARM, T, Q)
 
 
@@ -102,20 +120,41 @@ BAD = {
         r"q has shape \(2, 4\); expected \(N, 2\), .*; q' in MATLAB has",
     ),
     "another arm": ({"t": T, "q": np.zeros((4, 6))}, r"q has shape \(4, 6\); expected \(N, 2\)"),
-    "three axes": ({"t": T, "q": np.zeros((2, 1, 4))}, r"q has shape \(2, 1, 4\); expected \(N, 2\)"),
-    "fewer samples than times": ({"t": T, "q": Q[:3]}, r"q1 has 3 values; expected 4, one for each time"),
+    "three axes": (
+        {"t": T, "q": np.zeros((2, 1, 4))},
+        r"q has shape \(2, 1, 4\); expected \(N, 2\)",
+    ),
+    "fewer samples than times": (
+        {"t": T, "q": Q[:3]},
+        r"q1 has 3 values; expected 4, one for each time",
+    ),
     "a vector of another length": ({"t": T, "q1": T, "q2": T[:2]}, r"q2 has 2 values; expected 4"),
     "a matrix of times": ({"t": Q, "q": Q}, r"t has shape \(4, 2\); expected a vector"),
     "other times in a matrix": ({"t": T + 1, "q": timed(Q)}, r"q has times that are not those"),
-    "one sample": ({"t": T[:1], "q": Q[:1]}, r"times has shape \(1,\); expected \(N,\) with N >= 2"),
-    "times that do not increase": ({"t": T[::-1], "q": Q}, r"times do not increase: times\[0\] is 7 s"),
-    "NaN": ({"t": T, "q": np.where(Q[2, 1] == Q, np.nan, Q)}, r"q has values that are not finite, the first in row 2"),
+    "one sample": (
+        {"t": T[:1], "q": Q[:1]},
+        r"times has shape \(1,\); expected \(N,\) with N >= 2",
+    ),
+    "times that do not increase": (
+        {"t": T[::-1], "q": Q},
+        r"times do not increase: times\[0\] is 7 s",
+    ),
+    "NaN": (
+        {"t": T, "q": np.where(Q[2, 1] == Q, np.nan, Q)},
+        r"q has values that are not finite, the first in row 2",
+    ),
     "an infinite time": ({"t": [0, 1, 2, np.inf], "q": Q}, r"times\[3\] is not finite"),
     "text": ({"t": T, "q": "see appendix"}, r"q: found text; expected numbers"),
     "complex numbers": ({"t": T, "q": Q + 1j}, rf"q: found a complex matrix; {EXPORT}"),
     "a cell": ({"t": T, "q": np.array([1, "a"], dtype=object)}, rf"q: found a cell; {EXPORT}"),
-    "a structure without signals": ({"q": {"time": T, "values": Q}}, rf"q: found a struct; {EXPORT}"),
-    "a structure of another name": ({"out": {"q": Q}}, rf"no times: found out \(struct\); .*; {EXPORT}"),
+    "a structure without signals": (
+        {"q": {"time": T, "values": Q}},
+        rf"q: found a struct; {EXPORT}",
+    ),
+    "a structure of another name": (
+        {"out": {"q": Q}},
+        rf"no times: found out \(struct\); .*; {EXPORT}",
+    ),
     "empty": ({"t": np.zeros((0, 0)), "q": np.zeros((0, 2))}, r"times has shape \(0,\)"),
 }
 
@@ -152,10 +191,22 @@ def test_names_of_the_file_that_are_not_there_are_named(columns, complaint, tmp_
 @pytest.mark.parametrize(
     ("columns", "error", "complaint"),
     [
-        ({"q3": "a"}, ValueError, r"columns: found 'q3'; expected each at most once of t, q, qd, qdd, q1 ... q2"),
+        (
+            {"q3": "a"},
+            ValueError,
+            r"columns: found 'q3'; expected each at most once of t, q, qd, qdd, q1 ... q2",
+        ),
         ({"wrist": "a"}, ValueError, r"columns: found 'wrist'; expected .*, shoulder, elbow"),
-        ({"q1": "a", "shoulder": "b"}, ValueError, r"columns: found 'shoulder'; expected each at most once"),
-        ({"q1": 1}, TypeError, r"columns is .*; expected a mapping of our names to those of the file"),
+        (
+            {"q1": "a", "shoulder": "b"},
+            ValueError,
+            r"columns: found 'shoulder'; expected each at most once",
+        ),
+        (
+            {"q1": 1},
+            TypeError,
+            r"columns is .*; expected a mapping of our names to those of the file",
+        ),
         (["q1"], TypeError, r"columns is .*; expected a mapping"),
         ("t", TypeError, r"columns is 't'; expected a mapping"),
     ],
@@ -177,7 +228,10 @@ def opaque(name, kind):
     flags = element(6, struct.pack("<II", 17, 0))
     texts = b"".join(element(1, text.encode()) for text in (name, "MCOS", kind))
     content = element(
-        14, element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1)) + element(1, b"")
+        14,
+        element(6, struct.pack("<II", 13, 0))
+        + element(5, struct.pack("<ii", 1, 1))
+        + element(1, b""),
     )
     return element(14, flags + texts + content)
 
@@ -189,10 +243,14 @@ def with_opaque(folder, values, name, kind):
     return path
 
 
-@pytest.mark.parametrize(("values", "name"), [({"t": T}, "q"), ({"q": Q}, "t"), ({"t": T, "q1": T}, "q2")])
+@pytest.mark.parametrize(
+    ("values", "name"), [({"t": T}, "q"), ({"q": Q}, "t"), ({"t": T, "q1": T}, "q2")]
+)
 def test_a_timeseries_is_refused_with_what_to_do(values, name, tmp_path):
     path = with_opaque(tmp_path, values, name, "timeseries")
-    check_refused(lambda file: Trajectory.read(file, ARM), path, rf"{name}: found a timeseries; {EXPORT}")
+    check_refused(
+        lambda file: Trajectory.read(file, ARM), path, rf"{name}: found a timeseries; {EXPORT}"
+    )
 
 
 def test_a_name_of_several_lines_is_shown_in_one(tmp_path):
@@ -203,7 +261,9 @@ def test_a_name_of_several_lines_is_shown_in_one(tmp_path):
 
 def test_objects_of_other_names_are_named_where_nothing_else_is_there(tmp_path):
     path = with_opaque(tmp_path, {}, "out", "Simulink.SimulationOutput")
-    with pytest.raises(DescriptionError, match=rf"found out \(Simulink.SimulationOutput\); .*; {EXPORT}"):
+    with pytest.raises(
+        DescriptionError, match=rf"found out \(Simulink.SimulationOutput\); .*; {EXPORT}"
+    ):
         Trajectory.read(path, ARM)
     path = with_opaque(tmp_path, {"t": T, "q": Q}, "out", "Simulink.SimulationOutput")
     assert Trajectory.read(path, ARM) == Trajectory.from_samples(ARM, T, Q)
@@ -215,7 +275,11 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 @pytest.mark.parametrize(
     "content",
     [
-        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(384) + HDF5 + bytes(100),
+        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124)
+        + b"\x00\x02IM"
+        + bytes(384)
+        + HDF5
+        + bytes(100),
         b"MATLAB 7.3 MAT-file",
         bytes(512) + HDF5,
         HDF5 + bytes(600),
@@ -250,7 +314,9 @@ def test_no_damaged_byte_leads_anywhere_else(data, packed, tmp_path_factory):
 
 def structure(values, labels=("",), times=T):
     """What "To Workspace" writes as a structure, with time unless ``times`` is empty."""
-    signals = np.zeros((1, len(labels)), dtype=[(name, object) for name in ("values", "dimensions", "label")])
+    signals = np.zeros(
+        (1, len(labels)), dtype=[(name, object) for name in ("values", "dimensions", "label")]
+    )
     for k, label in enumerate(labels):
         each = values[k] if len(labels) > 1 else values
         signals[0, k] = (each, float(np.shape(each)[1]), label)

@@ -72,7 +72,9 @@ def test_what_is_written_fits(name, tmp_path):
     arm = library_robot(name)
     motion = Trajectory(arm, [0, 0.1], np.outer([0.1, 1e-300, -3.0, 1e-9], np.ones(arm.n))[None])
     for rate in (None, 3.0):
-        SCHEMA.validate(yaml.safe_load(motion.save(tmp_path / "motion.yaml", rate=rate).read_text()))
+        SCHEMA.validate(
+            yaml.safe_load(motion.save(tmp_path / "motion.yaml", rate=rate).read_text())
+        )
 
 
 def test_what_the_command_plans_fits(tmp_path, capsys):
@@ -109,7 +111,9 @@ def test_rows_may_be_left_out(rows, left_out, is_read):
     lines = WHOLE.splitlines()
     for row in rows:
         empty = [] if left_out is None else [f"  {row}: {left_out}"]
-        lines = [new for line in lines for new in (empty if line.startswith(f"  {row}") else [line])]
+        lines = [
+            new for line in lines for new in (empty if line.startswith(f"  {row}") else [line])
+        ]
     text = "\n".join(lines)
     SCHEMA.validate(yaml.safe_load(text))
     assert is_read(text)

@@ -56,7 +56,9 @@ def test_values_and_rates_are_those_of_the_chain_rule(pieces, degree, parts, see
     # Beside a corner of the path rounding decides which side counts.
     clear = np.abs(s[:, None] - path.breaks).min(axis=1) > 1e-9
     expected = path.qs(s) * rate[:, None]
-    assert np.abs(motion.qd(t) - expected)[clear].max(initial=0) < 100 * SAME * max(1, np.abs(expected).max())
+    assert np.abs(motion.qd(t) - expected)[clear].max(initial=0) < 100 * SAME * max(
+        1, np.abs(expected).max()
+    )
 
 
 def test_breaks_of_both_are_breaks_once():
@@ -66,7 +68,9 @@ def test_breaks_of_both_are_breaks_once():
     expected = [2 * s if s < 0.5 else 1 + 4 * (s - 0.5) for s in path.breaks]
     assert motion.breaks == pytest.approx(sorted({*np.round(expected, 12), 1.0}), abs=1e-9)
     # A path's break where the law has one too is one.
-    halves = JointPath(ARM, np.array([0.0, 0.5, 1.0]), np.array([[[0.0, 0], [1, 1]], [[0.5, 0.5], [2, 0]]]))
+    halves = JointPath(
+        ARM, np.array([0.0, 0.5, 1.0]), np.array([[[0.0, 0], [1, 1]], [[0.5, 0.5], [2, 0]]])
+    )
     assert halves.timed(*law).breaks == pytest.approx([0, 1, 3])
 
 

@@ -62,14 +62,18 @@ def test_no_other_blend_is_faster(name, seed):
     lower, upper = np.maximum(arm.numbers.lower, -1), np.minimum(arm.numbers.upper, 1)
     q0, q1 = lower + (upper - lower) * rng.uniform(0.1, 0.9, (2, arm.n))
     found = trapezoidal(arm, q0, q1).duration
-    others = [trapezoidal(arm, q0, q1, blend=blend).duration for blend in np.linspace(0.01, 0.5, 150)]
+    others = [
+        trapezoidal(arm, q0, q1, blend=blend).duration for blend in np.linspace(0.01, 0.5, 150)
+    ]
     assert found <= min(others) * (1 + GRID)
 
 
 def test_under_velocity_and_acceleration_the_duration_is_known():
     """d / v + v / a where v is reached (Siciliano et al. 2009, section 4.2.1)."""
     limits = Limits.of(ARM, velocity=1.0, acceleration=4.0, torque=np.inf)
-    assert trapezoidal(ARM, [0, 0], [1, 0.5], limits=limits).duration == pytest.approx(1.25, rel=1e-5)
+    assert trapezoidal(ARM, [0, 0], [1, 0.5], limits=limits).duration == pytest.approx(
+        1.25, rel=1e-5
+    )
     short = Limits.of(ARM, velocity=10.0, acceleration=4.0, torque=np.inf)
     assert trapezoidal(ARM, [0, 0], [1, 0.5], limits=short).duration == pytest.approx(1.0, rel=1e-9)
     assert cubic(ARM, [0, 0], [1, 0.5], limits=limits).duration == pytest.approx(1.5)
@@ -83,13 +87,17 @@ def test_the_shortest_duration_just_keeps_the_limits(law):
     assert least_slowdown(motion, Limits.of(PUMA)) == pytest.approx(1, rel=1e-6)
     slower = law(PUMA, q0, q1, duration=motion.duration * 1.5, limits=Limits.of(PUMA))
     assert slower.duration == pytest.approx(1.5 * motion.duration)
-    with pytest.raises(PlanningError, match=r"0.1 s are too short: the limits allow the motion in "):
+    with pytest.raises(
+        PlanningError, match=r"0.1 s are too short: the limits allow the motion in "
+    ):
         law(PUMA, q0, q1, duration=0.1, limits=Limits.of(PUMA))
     law(PUMA, q0, q1, duration=0.1)  # without limits a given duration is not held against any
 
 
 def test_overshooting_a_joint_limit_is_named():
-    with pytest.raises(PlanningError, match=r"shoulder leaves its upper limit, 3.14159 rad: it comes to .* at"):
+    with pytest.raises(
+        PlanningError, match=r"shoulder leaves its upper limit, 3.14159 rad: it comes to .* at"
+    ):
         cubic(ARM, [3.0, 0], [3.1, 0], 1.0, qd0=[5, 0])
     with pytest.raises(PlanningError, match=r"elbow leaves its lower limit"):
         trapezoidal(ARM, [0, 0], [0, -3])
@@ -101,12 +109,21 @@ def test_overshooting_a_joint_limit_is_named():
         (lambda: cubic(ARM, [0], [1, 1]), r"q0 has shape \(1,\); expected"),
         (lambda: cubic(ARM, [[0, 0]], [1, 1]), r"q0 has shape \(1, 2\); expected \(2,\)"),
         (lambda: cubic(ARM, [0, 0], [1, np.nan]), r"q1 is \[1.0, nan\]; expected finite values"),
-        (lambda: cubic(ARM, [0, 0], [1, 1], duration=0), r"duration is 0; expected 1e-06 to 1e\+06 s"),
+        (
+            lambda: cubic(ARM, [0, 0], [1, 1], duration=0),
+            r"duration is 0; expected 1e-06 to 1e\+06 s",
+        ),
         (lambda: cubic(ARM, [0, 0], [1, 1], qd0=[1, 0]), r"no duration; expected a duration"),
         (lambda: quintic(ARM, [0, 0], [1, 1], qdd1=[1, 0]), r"no duration; expected a duration"),
-        (lambda: trapezoidal(ARM, [0, 0], [1, 1], blend=0.6), r"blend is 0.6; expected more than 0 and at most 0.5"),
+        (
+            lambda: trapezoidal(ARM, [0, 0], [1, 1], blend=0.6),
+            r"blend is 0.6; expected more than 0 and at most 0.5",
+        ),
         (lambda: trapezoidal(ARM, [0, 0], [1, 1], blend=0.0), r"blend is 0.0"),
-        (lambda: cubic(ARM, [0.1, 0], [0.1, 0]), r"the motion ends where it begins; expected a duration"),
+        (
+            lambda: cubic(ARM, [0.1, 0], [0.1, 0]),
+            r"the motion ends where it begins; expected a duration",
+        ),
         (lambda: trapezoidal(ARM, [0.1, 0], [0.1, 0]), r"the motion ends where it begins"),
     ],
 )

@@ -17,7 +17,14 @@ def read(tmp_path, text, arm=ARM, suffix=".csv", **options):
 
 
 @pytest.mark.parametrize(
-    "header", ["t,q1,q2", "time,shoulder,elbow", "elbow,TIME,load,shoulder", "# log\n\nq2,t,note,q1", '"t","q_1","q_2"']
+    "header",
+    [
+        "t,q1,q2",
+        "time,shoulder,elbow",
+        "elbow,TIME,load,shoulder",
+        "# log\n\nq2,t,note,q1",
+        '"t","q_1","q_2"',
+    ],
 )
 def test_columns_are_found_by_name(header, tmp_path):
     names = [name.strip('"').lower() for name in header.splitlines()[-1].split(",")]
@@ -37,11 +44,13 @@ def test_rates_and_accelerations_are_used_where_they_are(prefixes, tmp_path):
     first, second = prefixes
     header = f"t,q1,q2,{first}1,{first}2,{second}1,{second}2"
     rows = [",".join(map(str, [k, *q[k], *qd[k], *qdd[k]])) for k in range(3)]
-    assert read(tmp_path, "\n".join([header, *rows])) == Trajectory.from_samples(ARM, [0, 1, 2], q, qd, qdd)
-    rows = [",".join(map(str, [k, *q[k], *qd[k]])) for k in range(3)]
-    assert read(tmp_path, "\n".join([header[: header.index(second) - 1], *rows])) == Trajectory.from_samples(
-        ARM, [0, 1, 2], q, qd
+    assert read(tmp_path, "\n".join([header, *rows])) == Trajectory.from_samples(
+        ARM, [0, 1, 2], q, qd, qdd
     )
+    rows = [",".join(map(str, [k, *q[k], *qd[k]])) for k in range(3)]
+    assert read(
+        tmp_path, "\n".join([header[: header.index(second) - 1], *rows])
+    ) == Trajectory.from_samples(ARM, [0, 1, 2], q, qd)
 
 
 def test_columns_are_mapped(tmp_path):
@@ -52,7 +61,9 @@ def test_columns_are_mapped(tmp_path):
     assert exchanged == motion
     with pytest.raises(DescriptionError, match=r"no column 'axis C': found Time \(s\), axis A"):
         read(tmp_path, text, columns={"t": "Time (s)", "q1": "axis A", "q2": "axis C"})
-    with pytest.raises(ValueError, match=r"columns: found 'q'; expected each at most once of t, q1 ... q2"):
+    with pytest.raises(
+        ValueError, match=r"columns: found 'q'; expected each at most once of t, q1 ... q2"
+    ):
         read(tmp_path, text, columns={"q": "axis A"})
     with pytest.raises(ValueError, match=r"columns is given; expected none for .yaml"):
         read(tmp_path, "", suffix=".yaml", columns={"q1": "axis A"})
@@ -158,18 +169,38 @@ def test_what_is_wrong_with_a_table_is_named(text, complaint, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
-        ("- elbow\n", "- wrist\n", r"joint_names: found wrist, shoulder; expected shoulder, elbow, in any order"),
+        (
+            "- elbow\n",
+            "- wrist\n",
+            r"joint_names: found wrist, shoulder; expected shoulder, elbow, in any order",
+        ),
         ("- elbow\n", "", r"joint_names: found shoulder; expected"),
         ("  - 0.5\n", "", r"points\[0\].positions: found 1 values; expected 2"),
         ("  - 0.5\n", "  - fast\n", r"points\[0\].positions: found .*; expected numbers"),
         ("  - 0.5\n", "  - .nan\n", r"points\[0\].positions: found .*; expected numbers"),
         ("  - 0.5\n", "  - nan\n", r"points\[0\].positions: found .*; expected finite numbers"),
-        ("    sec: 1\n", "    sec: -1\n", r"points\[1\].time_from_start: found '-1'; expected a whole number"),
+        (
+            "    sec: 1\n",
+            "    sec: -1\n",
+            r"points\[1\].time_from_start: found '-1'; expected a whole number",
+        ),
         ("    sec: 1\n", "", r"points\[1\].time_from_start: expected sec and nanosec"),
-        ("    sec: 1\n    nanosec: 500000000\n", "    sec: 0\n    nanosec: 0\n", r"times do not increase"),
-        ("  velocities: []\n", "  velocities: [1, 2]\n", r"points\[1\]: expected positions, and velocities .* as in"),
+        (
+            "    sec: 1\n    nanosec: 500000000\n",
+            "    sec: 0\n    nanosec: 0\n",
+            r"times do not increase",
+        ),
+        (
+            "  velocities: []\n",
+            "  velocities: [1, 2]\n",
+            r"points\[1\]: expected positions, and velocities .* as in",
+        ),
         ("points:", "pionts:", r"unknown key 'pionts'; expected header, joint_names, points"),
-        ("    sec: 0\n", "    sec: &a 0\n", r"line 3: found 'sec: &a 0'; expected a number or a name"),
+        (
+            "    sec: 0\n",
+            "    sec: &a 0\n",
+            r"line 3: found 'sec: &a 0'; expected a number or a name",
+        ),
         ("    sec: 0\n", "   sec: 0\n", r"line 4: found 'nanosec: 0'; expected"),
         ("    sec: 0\n", "\tsec: 0\n", r"line 3: .*expected"),
         (
@@ -192,13 +223,20 @@ def test_what_is_wrong_with_a_message_is_named(old, new, complaint, tmp_path):
 
 
 def test_archives_are_not_read_as_samples(tmp_path):
-    with pytest.raises(DescriptionError, match=r"found suffix '.npz'; expected one of .csv, .yaml, .yml, .mat"):
+    with pytest.raises(
+        DescriptionError, match=r"found suffix '.npz'; expected one of .csv, .yaml, .yml, .mat"
+    ):
         Trajectory.read(tmp_path / "x.npz", ARM)
 
 
 def test_a_file_of_ours_is_one_of_its_robot(tmp_path):
     puma, ur5 = library_robot("puma560"), library_robot("ur5")
-    path = Trajectory.from_samples(puma, [0, 1], [[0.0] * 6, [0.1] * 6]).save(tmp_path / "puma.csv", rate=10)
+    path = Trajectory.from_samples(puma, [0, 1], [[0.0] * 6, [0.1] * 6]).save(
+        tmp_path / "puma.csv", rate=10
+    )
     assert Trajectory.read(path, puma).n == 6
-    with pytest.raises(DescriptionError, match=r"trajectory was made for the robot puma560 .*; expected one for ur5"):
+    with pytest.raises(
+        DescriptionError,
+        match=r"trajectory was made for the robot puma560 .*; expected one for ur5",
+    ):
         Trajectory.read(path, ur5)

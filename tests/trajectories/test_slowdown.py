@@ -37,7 +37,12 @@ def test_slowed_down_so_much_some_limit_is_just_met(name, law):
     for _ in range(3):
         q0, q1 = lower + (upper - lower) * rng.uniform(0.05, 0.95, (2, arm.n))
         # One kind of limit at a time can be the tightest.
-        for bounds in ({}, {"velocity": NONE}, {"torque": NONE, "acceleration": 3.0}, {"velocity": NONE, "jerk": 5.0}):
+        for bounds in (
+            {},
+            {"velocity": NONE},
+            {"torque": NONE, "acceleration": 3.0},
+            {"velocity": NONE, "jerk": 5.0},
+        ):
             limits = Limits.of(arm, **bounds)
             motion = law(arm, q0, q1, duration=1.0)
             share = used(motion.slowed(least_slowdown(motion, limits)), limits, torques)
@@ -47,14 +52,18 @@ def test_slowed_down_so_much_some_limit_is_just_met(name, law):
 @given(st.floats(0.1, 10))
 def test_slowing_first_changes_nothing(c):
     motion, limits = quintic(PUMA, np.zeros(6), np.full(6, 0.5), duration=1.0), Limits.of(PUMA)
-    assert least_slowdown(motion.slowed(c), limits) * c == pytest.approx(least_slowdown(motion, limits), rel=1e-9)
+    assert least_slowdown(motion.slowed(c), limits) * c == pytest.approx(
+        least_slowdown(motion, limits), rel=1e-9
+    )
 
 
 def test_other_torques_may_be_given():
     motion = cubic(PUMA, np.zeros(6), np.full(6, 0.5), duration=1.0)
     limits = Limits.of(PUMA, velocity=NONE)
     expected = least_slowdown(motion, limits)
-    assert least_slowdown(motion, limits, reference_torques(PUMA)) == pytest.approx(expected, rel=1e-9)
+    assert least_slowdown(motion, limits, reference_torques(PUMA)) == pytest.approx(
+        expected, rel=1e-9
+    )
     doubled = reference_torques(PUMA)
     assert least_slowdown(motion, limits, lambda *state: 2 * doubled(*state)) > expected
 
@@ -83,27 +92,33 @@ def test_an_arm_too_weak_to_hold_itself_is_named():
 
 def test_a_joint_that_nothing_limits_is_named():
     motion = cubic(PUMA, np.zeros(6), [0, 0, 0, 0.5, 0, 0], duration=1.0)
-    with pytest.raises(PlanningError, match="nothing limits the motion: wrist_roll moves, and has neither"):
+    with pytest.raises(
+        PlanningError, match="nothing limits the motion: wrist_roll moves, and has neither"
+    ):
         least_slowdown(motion, Limits.of(PUMA, velocity=NONE, torque=NONE))
 
 
 def test_a_jump_is_no_matter_of_speed():
     corner = Trajectory(ARM, [0, 1, 2], [[[0, 0], [1, 0]], [[1, 0], [2, 0]]])
     with pytest.raises(
-        PlanningError, match=r"the velocity of shoulder jumps at 1 s; at no speed .* limit of acceleration"
+        PlanningError,
+        match=r"the velocity of shoulder jumps at 1 s; at no speed .* limit of acceleration",
     ):
         least_slowdown(corner, Limits.of(ARM, acceleration=1.0, torque=NONE))
     blends = Trajectory(ARM, [0, 1, 2], [[[0, 0], [0, 0], [1, 1]], [[1, 1], [2, 2], [-1, -1]]])
     with pytest.raises(PlanningError, match="the acceleration of shoulder jumps at 1 s"):
         least_slowdown(blends, Limits.of(ARM, jerk=1.0))
-    assert least_slowdown(blends, Limits.of(ARM, acceleration=2.0, velocity=NONE, torque=NONE)) == pytest.approx(1)
+    assert least_slowdown(
+        blends, Limits.of(ARM, acceleration=2.0, velocity=NONE, torque=NONE)
+    ) == pytest.approx(1)
 
 
 def test_leaving_the_joint_limits_is_named():
     # Both ends are inside, and the way leads outside between them.
     motion = Trajectory(ARM, [0, 2], [[[3, 0], [1, 0], [-0.5, 0]]])
     with pytest.raises(
-        PlanningError, match=r"shoulder leaves its upper limit, 3.14159 rad: it comes to 3.5 rad at 1 s"
+        PlanningError,
+        match=r"shoulder leaves its upper limit, 3.14159 rad: it comes to 3.5 rad at 1 s",
     ):
         require_inside(motion, Limits.of(ARM))
     require_inside(motion, Limits.of(ARM, upper=3.5))

@@ -47,9 +47,17 @@ def test_an_overshoot_between_points_is_named():
     [
         ([[0, 0]], None, r"points has shape \(1, 2\); expected \(m, 2\) with m >= 2"),
         ([[0, 0], [1, 1]], [0], r"times has shape \(1,\)"),
-        ([[0, 0], [1, 1]], [0, 1, 2], r"times has shape \(3,\); expected \(2,\), one for each point"),
+        (
+            [[0, 0], [1, 1]],
+            [0, 1, 2],
+            r"times has shape \(3,\); expected \(2,\), one for each point",
+        ),
         ([[0, 0], [1, 1]], [1, 1], r"times do not increase"),
-        ([[0, 0], [0, 0]], None, r"points\[1\] is the same as points\[0\]; expected another, or times"),
+        (
+            [[0, 0], [0, 0]],
+            None,
+            r"points\[1\] is the same as points\[0\]; expected another, or times",
+        ),
         ([[0, 0], [0, np.inf]], None, r"points\[1\] is not finite"),
     ],
 )

@@ -20,7 +20,14 @@ def paths(seed):
     rng = np.random.default_rng(seed)
     T0, T1 = random_pose(rng), random_pose(rng)
     centre, axis, angle = rng.uniform(-1, 1, 3), rng.normal(size=3), rng.uniform(-7, 7)
-    return T0, T1, [tool_line(T0, T1), *(tool_circle(T0, centre, axis, angle, turning) for turning in (False, True))]
+    return (
+        T0,
+        T1,
+        [
+            tool_line(T0, T1),
+            *(tool_circle(T0, centre, axis, angle, turning) for turning in (False, True)),
+        ],
+    )
 
 
 @given(st.integers(0, 10_000))
@@ -31,7 +38,9 @@ def test_twists_and_their_rates_are_those_of_differences(seed):
         velocity = (after - before)[:, :3, 3] / (2 * STEP)
         spin = (after - before)[:, :3, :3] / (2 * STEP) @ np.swapaxes(here[:, :3, :3], 1, 2)
         omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-        assert np.abs(path.twists(s) - np.concatenate([velocity, omega], axis=1)).max() < 100 * NUMERIC
+        assert (
+            np.abs(path.twists(s) - np.concatenate([velocity, omega], axis=1)).max() < 100 * NUMERIC
+        )
         rates = (path.twists(s + STEP) - path.twists(s - STEP)) / (2 * STEP)
         assert np.abs(path.twist_rates(s) - rates).max() < 100 * NUMERIC
 
@@ -42,7 +51,9 @@ def test_a_line_is_straight_and_turns_as_slerp(seed):
     s = np.linspace(0, 1, 9)
     T = line.poses(s)
     assert np.abs(T[[0, -1]] - [T0, T1]).max() < 1e-12
-    assert np.abs(T[:, :3, 3] - ((1 - s)[:, None] * T0[:3, 3] + s[:, None] * T1[:3, 3])).max() < 1e-12
+    assert (
+        np.abs(T[:, :3, 3] - ((1 - s)[:, None] * T0[:3, 3] + s[:, None] * T1[:3, 3])).max() < 1e-12
+    )
     slerp = Slerp([0, 1], Rotation.from_matrix([T0[:3, :3], T1[:3, :3]]))
     assert np.abs(T[:, :3, :3] - slerp(s).as_matrix()).max() < 1e-9
 
@@ -60,7 +71,12 @@ def test_a_circle_keeps_its_distance_and_plane(seed):
     assert np.abs(T[-1] - T0).max() < 1e-12
     assert np.abs(T[:, :3, :3] - T0[:3, :3]).max() == 0
     turned = tool_circle(T0, centre, axis, np.pi / 2, turning=True).poses(np.array([1.0]))[0]
-    assert np.abs(turned[:3, :3] - Rotation.from_rotvec(axis * np.pi / 2).as_matrix() @ T0[:3, :3]).max() < 1e-12
+    assert (
+        np.abs(
+            turned[:3, :3] - Rotation.from_rotvec(axis * np.pi / 2).as_matrix() @ T0[:3, :3]
+        ).max()
+        < 1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -69,7 +85,10 @@ def test_a_circle_keeps_its_distance_and_plane(seed):
         (lambda: tool_line(np.eye(3), np.eye(4)), r"T0 has shape \(3, 3\)"),
         (lambda: tool_line(np.eye(4), 2 * np.eye(4)), r"T1 is not a pose"),
         (lambda: tool_line([np.eye(4)], np.eye(4)), r"T0 has shape \(1, 4, 4\); expected \(4, 4\)"),
-        (lambda: tool_circle(np.eye(4), [1, 0], [0, 0, 1]), r"centre has shape \(2,\); expected \(3,\)"),
+        (
+            lambda: tool_circle(np.eye(4), [1, 0], [0, 0, 1]),
+            r"centre has shape \(2,\); expected \(3,\)",
+        ),
         (lambda: tool_circle(np.eye(4), [1, 0, 0], [0, 0, 0]), r"axis has length 0"),
         (lambda: tool_circle(np.eye(4), [0, 0, 1], [0, 0, 1]), r"T0 lies on the axis"),
         (lambda: tool_circle(np.eye(4), [1, 0, 0], [0, 0, 1], np.inf), r"angle is inf"),

@@ -11,7 +11,9 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import Trajectory
 from dhkit.trajectories.torque_peaks import torque_peaks
 
-WITH_BODIES = [name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)]
+WITH_BODIES = [
+    name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)
+]
 DENSE = 20_001
 BELOW, ABOVE = 1e-9, 2e-6
 """Shares by which a bound may be below the largest sample (rounding) and above it (samples miss the peak)."""
@@ -22,19 +24,28 @@ def largest_torques(arm, motion, friction=False):
     model = arm.model
     data = model.createData()
     points = DENSE // (len(motion.breaks) - 1)
-    q, qd, qdd = (motion.pieces.differentiated(order).inside(points)[1].reshape(-1, arm.n) for order in range(3))
+    q, qd, qdd = (
+        motion.pieces.differentiated(order).inside(points)[1].reshape(-1, arm.n)
+        for order in range(3)
+    )
     rows = [pin.rnea(model, data, *state).copy() for state in zip(q, qd, qdd, strict=True)]
     numbers = arm.description.numbers
     tau = np.reshape(rows, qd.shape) + qdd @ numbers.coupling
     if friction:
         forwards, backwards = numbers.coulomb.T
-        tau = tau + numbers.viscous * qd + np.where(qd > 0, forwards, np.where(qd < 0, backwards, 0.0))
+        tau = (
+            tau
+            + numbers.viscous * qd
+            + np.where(qd > 0, forwards, np.where(qd < 0, backwards, 0.0))
+        )
     return np.abs(tau).max(axis=0)
 
 
 def random_motion(arm, rng, kind):
     lower, upper = arm.limits.lower.clip(-3), arm.limits.upper.clip(None, 3)
-    return getattr(arm, kind)(rng.uniform(lower, upper), rng.uniform(lower, upper), duration=rng.uniform(0.3, 2.0))
+    return getattr(arm, kind)(
+        rng.uniform(lower, upper), rng.uniform(lower, upper), duration=rng.uniform(0.3, 2.0)
+    )
 
 
 @pytest.mark.parametrize("name", different_robots_first(WITH_BODIES))
@@ -48,9 +59,17 @@ def test_bounds_are_the_largest_torques(name, law):
         peaks = torque_peaks(arm.description, motion, np.where(moved, seen, np.inf))
         assert peaks.is_proved.all()
         law.holds(
-            "largest sample over its bound, less 1", np.max(1 / peaks.largest[moved], initial=0.0) - 1, BELOW, trial
+            "largest sample over its bound, less 1",
+            np.max(1 / peaks.largest[moved], initial=0.0) - 1,
+            BELOW,
+            trial,
         )
-        law.holds("bound over the largest sample, less 1", np.max(peaks.largest[moved], initial=0.0) - 1, ABOVE, trial)
+        law.holds(
+            "bound over the largest sample, less 1",
+            np.max(peaks.largest[moved], initial=0.0) - 1,
+            ABOVE,
+            trial,
+        )
 
 
 def test_dry_friction_is_in_the_bounds():
@@ -75,7 +94,9 @@ def test_where_a_joint_turns_back_dry_friction_is_bounded_and_not_proved():
     assert loose.is_proved.all()
 
 
-@pytest.mark.parametrize(("name", "joint", "duration"), [("ur5", 0, 2.13), ("stanford", 0, 0.91), ("panda", 1, 1.2)])
+@pytest.mark.parametrize(
+    ("name", "joint", "duration"), [("ur5", 0, 2.13), ("stanford", 0, 0.91), ("panda", 1, 1.2)]
+)
 def test_a_torque_between_states_is_certified_or_refused_to_a_millionth(name, joint, duration):
     arm = dhkit.Arm.load(name)
     rng = np.random.default_rng(3)
@@ -87,7 +108,9 @@ def test_a_torque_between_states_is_certified_or_refused_to_a_millionth(name, jo
     def is_certified(limit):
         torque = free.copy()
         torque[joint] = limit
-        return arm.certify(motion, limits=dhkit.Limits(-free, free, free, free, free, torque), friction=False).ok
+        return arm.certify(
+            motion, limits=dhkit.Limits(-free, free, free, free, free, torque), friction=False
+        ).ok
 
     assert is_certified(peak * (1 + 2e-6))
     assert not is_certified(peak * (1 - 2e-6))

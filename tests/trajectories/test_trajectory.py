@@ -79,7 +79,9 @@ def test_friction_is_added_on_request():
     numbers = PUMA.numbers
     qd = motion.qd(0.7)
     coulomb = np.where(qd > 0, numbers.coulomb[:, 0], numbers.coulomb[:, 1])
-    assert np.allclose(motion.tau(0.7, friction=True) - motion.tau(0.7), numbers.viscous * qd + coulomb)
+    assert np.allclose(
+        motion.tau(0.7, friction=True) - motion.tau(0.7), numbers.viscous * qd + coulomb
+    )
 
 
 @given(st.floats(0.05, 20), st.integers(0, 100))
@@ -118,7 +120,9 @@ def test_joined_motions_follow_each_other():
     assert np.allclose(both.q(2 + t), back.q(t))
     high = Trajectory(ARM, [0, 1], [[[1, 2], [0, 0], [0, 0], [1, 1]]])
     assert there.then(high).q(3.0) == pytest.approx([2, 3])
-    with pytest.raises(ValueError, match=r"shoulder ends at 1 rad and goes on from 0 rad; expected the same value"):
+    with pytest.raises(
+        ValueError, match=r"shoulder ends at 1 rad and goes on from 0 rad; expected the same value"
+    ):
         there.then(there)
 
 
@@ -162,17 +166,29 @@ def test_samples_at_a_rate_end_with_the_end():
 @pytest.mark.parametrize(
     ("call", "complaint"),
     [
-        (lambda: Trajectory(ARM, [0], np.ones((1, 2, 2))), r"breaks has shape \(1,\); expected \(K\+1,\)"),
+        (
+            lambda: Trajectory(ARM, [0], np.ones((1, 2, 2))),
+            r"breaks has shape \(1,\); expected \(K\+1,\)",
+        ),
         (
             lambda: Trajectory(ARM, [0, 1], np.ones((2, 2, 2))),
             r"coefficients has shape \(2, 2, 2\); expected \(1, p\+1, 2\)",
         ),
         (lambda: Trajectory(ARM, [0, 1], np.ones((1, 2, 3))), r"expected \(1, p\+1, 2\)"),
         (lambda: Trajectory(ARM, [0, 1], np.ones((1, 0, 2))), r"expected \(1, p\+1, 2\)"),
-        (lambda: Trajectory(ARM, [0.5, 1], np.ones((1, 2, 2))), r"breaks begin with 0.5; expected 0"),
-        (lambda: Trajectory(ARM, [0, 1, 1], np.ones((2, 2, 2))), r"breaks\[1\] is 1, breaks\[2\] is 1"),
+        (
+            lambda: Trajectory(ARM, [0.5, 1], np.ones((1, 2, 2))),
+            r"breaks begin with 0.5; expected 0",
+        ),
+        (
+            lambda: Trajectory(ARM, [0, 1, 1], np.ones((2, 2, 2))),
+            r"breaks\[1\] is 1, breaks\[2\] is 1",
+        ),
         (lambda: Trajectory(ARM, [0, np.inf], np.ones((1, 2, 2))), r"breaks has inf at \(1,\)"),
-        (lambda: Trajectory(ARM, [0, 1], np.full((1, 2, 2), np.nan)), r"coefficients has nan at \(0, 0, 0\)"),
+        (
+            lambda: Trajectory(ARM, [0, 1], np.full((1, 2, 2), np.nan)),
+            r"coefficients has nan at \(0, 0, 0\)",
+        ),
         (lambda: random_motion(ARM).sample(), r"rate=None and n=None; expected one of them"),
         (lambda: random_motion(ARM).sample(rate=1, n=2), r"rate=1 and n=2; expected one of them"),
         (lambda: random_motion(ARM).sample(rate=0), r"rate is 0; expected a positive number"),
@@ -181,9 +197,15 @@ def test_samples_at_a_rate_end_with_the_end():
         (lambda: random_motion(ARM).slowed(0), r"c is 0; expected a number from 1e-12 to 1e12"),
         (lambda: random_motion(ARM).q(0.0, side="up"), r"side is 'up'; expected 'right' or 'left'"),
         (lambda: Trajectory.from_samples(ARM, [0], [[0, 0]]), r"times has shape \(1,\)"),
-        (lambda: Trajectory.from_samples(ARM, [0, 1], [[0, 0]]), r"q has shape \(1, 2\); expected \(2, 2\)"),
+        (
+            lambda: Trajectory.from_samples(ARM, [0, 1], [[0, 0]]),
+            r"q has shape \(1, 2\); expected \(2, 2\)",
+        ),
         (lambda: Trajectory.from_samples(ARM, [0, 0], np.ones((2, 2))), r"times do not increase"),
-        (lambda: Trajectory.from_samples(ARM, [0, 1], np.full((2, 2), np.nan)), r"q has values that are not finite"),
+        (
+            lambda: Trajectory.from_samples(ARM, [0, 1], np.full((2, 2), np.nan)),
+            r"q has values that are not finite",
+        ),
         (
             lambda: Trajectory.from_samples(ARM, [0, 1], np.ones((2, 2)), qdd=np.ones((2, 2))),
             r"qdd is given without qd",
@@ -206,7 +228,9 @@ def test_samples_are_met_with_their_derivatives(count, seed):
     times = 3.0 + np.cumsum(rng.uniform(0.2, 1, count))
     q, qd, qdd = rng.uniform(-2, 2, (3, count, 2))
     t = times - times[0]
-    through = [Trajectory.from_samples(ARM, times, *given) for given in ((q,), (q, qd), (q, qd, qdd))]
+    through = [
+        Trajectory.from_samples(ARM, times, *given) for given in ((q,), (q, qd), (q, qd, qdd))
+    ]
     for motion in through:
         for side in ("left", "right"):
             assert np.abs(motion.q(t, side) - q).max() < 1e-11
@@ -234,7 +258,8 @@ def test_another_robots_motion_is_refused_by_names():
     assert motion.matches(PUMA)
     assert not motion.matches(loaded)
     with pytest.raises(
-        DescriptionError, match=rf"one of puma560 \({PUMA.digest}\); expected one of planar2r \({ARM.digest}\)"
+        DescriptionError,
+        match=rf"one of puma560 \({PUMA.digest}\); expected one of planar2r \({ARM.digest}\)",
     ):
         motion.require(ARM)
     with pytest.raises(DescriptionError, match="puma560"):
@@ -246,7 +271,9 @@ def _parts(motion):
 
 
 @given(st.integers(0, 1000), st.integers(1, 6), st.integers(0, 9), st.integers(1, 5))
-def test_divided_pieces_are_the_same_function_between_their_bernstein_coefficients(seed, pieces, degree, parts):
+def test_divided_pieces_are_the_same_function_between_their_bernstein_coefficients(
+    seed, pieces, degree, parts
+):
     whole = random_motion(ARM, pieces, degree, seed).pieces
     divided = whole.divided(parts)
     assert len(divided.coefficients) == parts * len(whole.coefficients)
@@ -266,11 +293,15 @@ def test_bounds_of_polynomials_are_proved_and_tight(law):
         f = Pieces.of(breaks, rng.normal(size=(pieces, degree + 1, 3)), 3)
         found = f.bounds(1e-9)
         _, sampled = f.inside(4001)
-        beyond = np.maximum(sampled.max(axis=(0, 1)) - found.highest, found.lowest - sampled.min(axis=(0, 1)))
+        beyond = np.maximum(
+            sampled.max(axis=(0, 1)) - found.highest, found.lowest - sampled.min(axis=(0, 1))
+        )
         law.holds("sample beyond its bound", float(beyond.max()), 1e-12)
         for bound, place, choose in (
             (found.highest, found.at_highest, max),
             (found.lowest, found.at_lowest, min),
         ):
             reached = [choose(f(place[i], "left")[i], f(place[i], "right")[i]) for i in range(3)]
-            law.holds("bound beyond the value at its place", float(np.abs(bound - reached).max()), 1.1e-9)
+            law.holds(
+                "bound beyond the value at its place", float(np.abs(bound - reached).max()), 1.1e-9
+            )

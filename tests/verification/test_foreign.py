@@ -34,7 +34,10 @@ def test_constant_differences_of_tool_and_base_are_said():
     assert not report
     assert any("constant tool" in note and "degrees" in note for note in report.notes)
     report = verify_urdf(puma.with_base(T).description, file, samples=20)
-    assert any("constant base: the URDF's arm stands" in note and "(0, 0, -90)" in note for note in report.notes)
+    assert any(
+        "constant base: the URDF's arm stands" in note and "(0, 0, -90)" in note
+        for note in report.notes
+    )
 
 
 def test_a_wrong_mass_and_a_wrong_length_are_found(tmp_path):
@@ -92,7 +95,9 @@ BAD = {
     "another root": ("<sdf/>", "found <sdf>; expected <robot>"),
     "deep": ("<robot>" + "<a>" * 100 + "</a>" * 100 + "</robot>", "nested more than 64 deep"),
     "two parents": (
-        simple(more='<link name="c"/><joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint>'),
+        simple(
+            more='<link name="c"/><joint name="k" type="fixed"><parent link="c"/><child link="b"/></joint>'
+        ),
         "link 'b' has two parents, by joints 'j' and 'k'",
     ),
     "cycle": (
@@ -107,16 +112,25 @@ BAD = {
         "joint 'j': <child> is 'x', which is not a link",
     ),
     "same names": (simple(more='<link name="b"/>'), "two links have the name 'b'"),
-    "nan": (simple().replace('mass value="1"', 'mass value="nan"'), "link 'b': <mass value>: found 'nan'"),
+    "nan": (
+        simple().replace('mass value="1"', 'mass value="nan"'),
+        "link 'b': <mass value>: found 'nan'",
+    ),
     "no number": (simple().replace('ixx="1"', 'ixx="one"'), "link 'b': <inertia ixx>: found 'one'"),
     "zero axis": (simple(axis="0 0 0"), "joint 'j': <axis xyz>: found 0 0 0; expected a direction"),
     "short axis": (simple(axis="0 1"), "joint 'j': <axis xyz> has 2 numbers; expected 3"),
-    "negative mass": (simple().replace('mass value="1"', 'mass value="-1"'), "link 'b': mass is -1"),
+    "negative mass": (
+        simple().replace('mass value="1"', 'mass value="-1"'),
+        "link 'b': mass is -1",
+    ),
     "mimic": (
         simple().replace("<limit", '<mimic joint="x"/><limit'),
         "no moving joints below link 'a' that do not follow others (mimic)",
     ),
-    "hinge": (simple("hinge"), "joint 'j' is 'hinge'; expected one of revolute, continuous, prismatic, fixed"),
+    "hinge": (
+        simple("hinge"),
+        "joint 'j' is 'hinge'; expected one of revolute, continuous, prismatic, fixed",
+    ),
     "no mass": (simple().replace('<mass value="1"/>', ""), "link 'b': <inertial> lacks mass"),
     "many joints": (
         "<robot><link name='l0'/>"
@@ -166,7 +180,9 @@ def changed(tmp_path, old, new, *, joint=None):
     file = tmp_path / "changed.urdf"
     file.write_text(text[:start] + text[start:].replace(old, new, 1))
     report = verify_urdf(library_robot("stanford"), file, samples=10)
-    return report.ok, " | ".join(note for note in report.notes[1:] if not note.startswith("yourdfpy"))
+    return report.ok, " | ".join(
+        note for note in report.notes[1:] if not note.startswith("yourdfpy")
+    )
 
 
 def test_differences_are_said_joint_by_joint(tmp_path):
@@ -175,11 +191,25 @@ def test_differences_are_said_joint_by_joint(tmp_path):
         False,
         "joint 2 (shoulder) moves the other way in the URDF",
     )
-    assert changed(tmp_path, axis, other, joint="boom") == (False, "joint 3 (boom) moves the other way in the URDF")
-    ok, said = changed(tmp_path, 'rpy="-1.5707963267948966 0 0"', 'rpy="-1.5707963267948966 0.2 0"', joint="shoulder")
-    assert (ok, said) == (False, "joint 2 (shoulder): the URDF's zero is at 11.4592 degrees of the table's")
+    assert changed(tmp_path, axis, other, joint="boom") == (
+        False,
+        "joint 3 (boom) moves the other way in the URDF",
+    )
+    ok, said = changed(
+        tmp_path,
+        'rpy="-1.5707963267948966 0 0"',
+        'rpy="-1.5707963267948966 0.2 0"',
+        joint="shoulder",
+    )
+    assert (ok, said) == (
+        False,
+        "joint 2 (shoulder): the URDF's zero is at 11.4592 degrees of the table's",
+    )
     ok, said = changed(tmp_path, axis, '<axis xyz="0 0.6 0.8" />', joint="wrist_pitch")
-    assert (ok, said) == (False, "joint 5 (wrist_pitch): with all joints at zero its axis is turned by 36.8699 degrees")
+    assert (ok, said) == (
+        False,
+        "joint 5 (wrist_pitch): with all joints at zero its axis is turned by 36.8699 degrees",
+    )
 
 
 def test_differences_are_said_link_by_link(tmp_path):
@@ -193,7 +223,9 @@ def test_differences_are_said_link_by_link(tmp_path):
 
 
 def test_axes_of_fixed_joints_and_limits_of_continuous_ones_do_not_matter(tmp_path):
-    assert changed(tmp_path, '<child link="tool" />', '<child link="tool" /><axis xyz="0 0 0"/>') == (True, "")
+    assert changed(
+        tmp_path, '<child link="tool" />', '<child link="tool" /><axis xyz="0 0 0"/>'
+    ) == (True, "")
     assert changed(tmp_path, 'type="revolute"', 'type="continuous"') == (True, "")
 
 
@@ -209,7 +241,9 @@ def test_names_cannot_break_a_report(tmp_path):
     file = tmp_path / "names.urdf"
     file.write_text(simple().replace('name="j"', 'name="a|&lt;c>"'))
     report = verify_urdf(dhkit.Arm.from_dh([(0, 0, 0, 0)]).description, file, samples=3)
-    assert any(note.startswith("yourdfpy") and "reads the same frames" in note for note in report.notes)
+    assert any(
+        note.startswith("yourdfpy") and "reads the same frames" in note for note in report.notes
+    )
     assert "joints in order: a|<c>" in str(report)
     assert "a\\|&lt;c>" in report.markdown()
     file.write_text(simple().replace('name="j"', 'name="a&#10;b&#155;c"'))
@@ -229,12 +263,25 @@ def test_other_encodings_and_missing_files(tmp_path):
 def test_command(tmp_path, capsys):
     file = tmp_path / "report.tex"
     with pytest.raises(SystemExit) as stopped:
-        main(["verify", "planar2r", "--urdf", str(asset("urdf/planar2r.urdf")), "--samples", "5", "-o", str(file)])
+        main(
+            [
+                "verify",
+                "planar2r",
+                "--urdf",
+                str(asset("urdf/planar2r.urdf")),
+                "--samples",
+                "5",
+                "-o",
+                str(file),
+            ]
+        )
     assert stopped.value.code == 0
     assert "tool position" in capsys.readouterr().out
     assert file.read_text().startswith("% needs")
     with pytest.raises(SystemExit) as stopped:
-        main(["verify", "puma560", "--urdf", str(asset("urdf/ur5.urdf")), "--samples", "5", "--json"])
+        main(
+            ["verify", "puma560", "--urdf", str(asset("urdf/ur5.urdf")), "--samples", "5", "--json"]
+        )
     assert stopped.value.code == 1
     with pytest.raises(SystemExit) as stopped:
         main(["verify", "planar2r", "-o", "x.pdf"])

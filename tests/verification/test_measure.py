@@ -13,7 +13,9 @@ def test_differences_are_relative_to_the_largest_entry_or_the_floor():
     reference = np.array([[2.0, -4.0], [0.0, 1e-9], [0.0, 0.0], [1.0, 1.0]])
     ours = reference + np.array([[0.4, 0.0], [1e-9, 0.0], [0.0, 0.0], [np.nan, 0.0]])
     assert relative_error(ours, reference)[:3] == pytest.approx([0.1, 1.0, 0.0])
-    assert relative_error(ours, reference, np.array([1.0, 10.0, 0.0, 0.0]))[:3] == pytest.approx([0.1, 1e-10, 0.0])
+    assert relative_error(ours, reference, np.array([1.0, 10.0, 0.0, 0.0]))[:3] == pytest.approx(
+        [0.1, 1e-10, 0.0]
+    )
     assert np.isnan(relative_error(ours, reference)[3])
     assert relative_error(np.ones((1, 2)), np.zeros((1, 2)))[0] == np.inf
     with pytest.raises(ValueError, match="shapes"):
@@ -23,7 +25,11 @@ def test_differences_are_relative_to_the_largest_entry_or_the_floor():
 def test_floors_and_tolerance():
     arm = library_robot("planar2r")
     M = np.array([np.diag([2.0, 1.0]), np.diag([1.0, 1e-8])])
-    qd, qdd, tau = np.array([[1.0, -3.0]] * 2), np.array([[5.0, 0.0]] * 2), np.array([[8.0, 0.0]] * 2)
+    qd, qdd, tau = (
+        np.array([[1.0, -3.0]] * 2),
+        np.array([[5.0, 0.0]] * 2),
+        np.array([[8.0, 0.0]] * 2),
+    )
     floors = Floors.of(arm, M, qd, qdd, tau)
     numbers = arm.numbers
     weight = numbers.mass.sum() * np.linalg.norm(numbers.gravity) * max(1.0, arm.reach)
@@ -37,7 +43,9 @@ def test_floors_and_tolerance():
 
 
 def test_a_report_prints_errors_that_are_not_finite():
-    agreements = tuple(Agreement(name, error, 1e-12, (0.0,)) for name, error in (("M", np.inf), ("g", np.nan)))
+    agreements = tuple(
+        Agreement(name, error, 1e-12, (0.0,)) for name, error in (("M", np.inf), ("g", np.nan))
+    )
     report = VerificationReport("planar2r", "Pinocchio", 1, 0, agreements)
     assert not report.ok
     assert r"\infty" in report.latex() and r"\mathrm{NaN}" in report.latex()

@@ -41,10 +41,16 @@ class RobotFile:
         if not isinstance(value, str):
             return value * unit
         expression = parse(value, tuple(self.parameters))
-        values = {name: parse(str(self.parameters[name]), tuple(self.parameters)) for name in expression.symbols}
+        values = {
+            name: parse(str(self.parameters[name]), tuple(self.parameters))
+            for name in expression.symbols
+        }
         while expression.symbols:
             expression = put_in(expression, values)
-            values = {name: parse(str(self.parameters[name]), tuple(self.parameters)) for name in expression.symbols}
+            values = {
+                name: parse(str(self.parameters[name]), tuple(self.parameters))
+                for name in expression.symbols
+            }
         return float(expression)
 
     def joints(self):
@@ -68,7 +74,9 @@ class RobotFile:
     def armature(self):
         for joint in self.joints():
             drive = joint.get("drive", {})
-            yield self.number(drive.get("gear", 1)) ** 2 * self.number(drive.get("rotor_inertia", 0))
+            yield self.number(drive.get("gear", 1)) ** 2 * self.number(
+                drive.get("rotor_inertia", 0)
+            )
 
     def coupling(self):
         B = np.zeros((len(self.joints()),) * 2)
@@ -127,7 +135,9 @@ def mass_matrix_and_gravity(file, q, gravity):
     return M, g
 
 
-WITH_BODIES = [name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)]
+WITH_BODIES = [
+    name for name in robots() if all(joint.bodies for joint in library_robot(name).joints)
+]
 
 
 @pytest.mark.parametrize("name", WITH_BODIES)
@@ -147,7 +157,9 @@ def test_a_wrong_gear_and_a_moved_body_are_seen():
     M, _ = mass_matrix_and_gravity(file, q, np.array([0.0, 0.0, -9.81]))
     joint = arm.joints[2]
     geared = replace(joint, drive=replace(joint.drive, gear=-joint.drive.gear * 2))
-    moved = replace(joint, bodies=tuple(replace(b, com=(b.com[1], b.com[0], b.com[2])) for b in joint.bodies))
+    moved = replace(
+        joint, bodies=tuple(replace(b, com=(b.com[1], b.com[0], b.com[2])) for b in joint.bodies)
+    )
     for wrong in (geared, moved):
         other = Arm(replace(arm, joints=(*arm.joints[:2], wrong, *arm.joints[3:])))
         assert other.verify(20).ok  # both sides of verify() share the wrong number

@@ -35,17 +35,31 @@ def test_every_robot_agrees(name, law):
         law.holds(agreement.quantity, agreement.error, agreement.tolerance, name)
     assert report.ok
     compared = {agreement.quantity for agreement in report.agreements}
-    assert compared >= DYNAMICS or any("forward dynamics not compared" in note for note in report.notes)
+    assert compared >= DYNAMICS or any(
+        "forward dynamics not compared" in note for note in report.notes
+    )
 
 
 @pytest.mark.parametrize(
     ("change", "found"),
     [
         (lambda model: model.armature.__iadd__(1e-9), {"mass matrix M", "inverse dynamics tau"}),
-        (lambda model: setattr(model.gravity, "linear", np.array([0, 0, -9.81 - 1e-9])), {"gravity torque g"}),
-        (lambda model: setattr(model.inertias[2], "mass", 17.4 + 1e-9), {"mass matrix M", "potential energy V"}),
-        (lambda model: setattr(model.inertias[2], "lever", model.inertias[2].lever + 1e-10), {"gravity torque g"}),
-        (lambda model: setattr(model.jointPlacements[3], "translation", np.full(3, 0.1)), {"frame positions"}),
+        (
+            lambda model: setattr(model.gravity, "linear", np.array([0, 0, -9.81 - 1e-9])),
+            {"gravity torque g"},
+        ),
+        (
+            lambda model: setattr(model.inertias[2], "mass", 17.4 + 1e-9),
+            {"mass matrix M", "potential energy V"},
+        ),
+        (
+            lambda model: setattr(model.inertias[2], "lever", model.inertias[2].lever + 1e-10),
+            {"gravity torque g"},
+        ),
+        (
+            lambda model: setattr(model.jointPlacements[3], "translation", np.full(3, 0.1)),
+            {"frame positions"},
+        ),
     ],
 )
 def test_what_is_wrong_is_found(monkeypatch, change, found):
@@ -71,7 +85,9 @@ def test_the_worst_state_is_where_it_happens(monkeypatch):
 
     monkeypatch.setattr(dynamics, "gravity_torque", wrong)
     report = verify(description, 20)
-    (agreement,) = (agreement for agreement in report.agreements if agreement.quantity == "gravity torque g")
+    (agreement,) = (
+        agreement for agreement in report.agreements if agreement.quantity == "gravity torque g"
+    )
     assert agreement.q == tuple(random_motions(description, 20).q[7])
     assert agreement.qd == ()
 
@@ -79,10 +95,14 @@ def test_the_worst_state_is_where_it_happens(monkeypatch):
 def test_nan_is_no_agreement(monkeypatch):
     import dhkit.dynamics as dynamics
 
-    monkeypatch.setattr(dynamics, "kinetic_energy", lambda description, q, qd: np.full(len(q), np.nan))
+    monkeypatch.setattr(
+        dynamics, "kinetic_energy", lambda description, q, qd: np.full(len(q), np.nan)
+    )
     report = verify(library_robot("planar2r"), 5)
     assert not report.ok
-    assert [agreement.quantity for agreement in report.agreements if not agreement.ok] == ["kinetic energy K"]
+    assert [agreement.quantity for agreement in report.agreements if not agreement.ok] == [
+        "kinetic energy K"
+    ]
 
 
 def test_an_arm_without_bodies_is_compared_as_far_as_it_goes():
@@ -96,7 +116,9 @@ def test_a_singular_mass_matrix_is_said():
     planar = library_robot("planar2r")
     body = replace(planar.joints[1].body, mass=planar.joints[1].body.mass * 0)
     light = replace(body, inertia=type(body.inertia)())
-    report = verify(replace(planar, joints=(planar.joints[0], replace(planar.joints[1], bodies=(light,)))), 5)
+    report = verify(
+        replace(planar, joints=(planar.joints[0], replace(planar.joints[1], bodies=(light,)))), 5
+    )
     assert report.ok
     assert any("forward dynamics not compared" in note and "elbow" in note for note in report.notes)
 
@@ -132,5 +154,8 @@ def test_arm_verify():
 
 
 def test_the_inertia_of_coupled_drives_is_said_to_be_added():
-    assert "the inertia of coupled drives was added to Pinocchio's M" in verify(library_robot("manutec_r3"), 5).notes
+    assert (
+        "the inertia of coupled drives was added to Pinocchio's M"
+        in verify(library_robot("manutec_r3"), 5).notes
+    )
     assert not verify(library_robot("puma560"), 5).notes

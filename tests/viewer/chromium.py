@@ -75,7 +75,9 @@ class Chromium:
     """A browser process with an empty profile; pages are opened by :meth:`page`."""
 
     def __init__(self) -> None:
-        self.profile = tempfile.TemporaryDirectory(prefix="dhkit-chromium-", ignore_cleanup_errors=True)
+        self.profile = tempfile.TemporaryDirectory(
+            prefix="dhkit-chromium-", ignore_cleanup_errors=True
+        )
         self.process = subprocess.Popen(
             [str(BINARY), *FLAGS, f"--user-data-dir={self.profile.name}", "about:blank"],
             stdout=subprocess.DEVNULL,
@@ -97,7 +99,9 @@ class Chromium:
 
         return wait_for(lambda: found if len(found := lines()) == 2 else None, "Chromium's port")
 
-    def page(self, width: int = 900, height: int = 700, *, dark: bool = False, scale: float = 1.0) -> Page:
+    def page(
+        self, width: int = 900, height: int = 700, *, dark: bool = False, scale: float = 1.0
+    ) -> Page:
         """Open an empty page of a size in CSS px, in a window of its own: a hidden tab would draw nothing."""
         target = self.browser.call("Target.createTarget", url="about:blank", newWindow=True)
         page = Page(self.loop, f"{self.address}/devtools/page/{target['targetId']}")
@@ -128,10 +132,14 @@ class Connection:
     def call(self, method: str, **parameters: object) -> dict:
         """Return a DevTools command's result."""
         self.count += 1
-        return self.loop.run_until_complete(asyncio.wait_for(self._call(self.count, method, parameters), HANGS))
+        return self.loop.run_until_complete(
+            asyncio.wait_for(self._call(self.count, method, parameters), HANGS)
+        )
 
     async def _call(self, number: int, method: str, parameters: dict) -> dict:
-        await self.socket.write_message(json.dumps({"id": number, "method": method, "params": parameters}))
+        await self.socket.write_message(
+            json.dumps({"id": number, "method": method, "params": parameters})
+        )
         while True:
             text = await self.socket.read_message()
             assert text is not None, "Chromium closed the page"
@@ -197,7 +205,9 @@ class Page(Connection):
 
     def evaluate(self, expression: str) -> object:
         """Return a JavaScript expression's value."""
-        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        result = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
@@ -205,17 +215,23 @@ class Page(Connection):
         """Wait for a JavaScript condition."""
         deadline = time.monotonic() + HANGS
         while not self.evaluate(f"Boolean({condition})"):
-            assert time.monotonic() < deadline, f"{condition} not true after {HANGS:g} s; errors: {self.errors}"
+            assert time.monotonic() < deadline, (
+                f"{condition} not true after {HANGS:g} s; errors: {self.errors}"
+            )
             time.sleep(0.02)
 
     def settle(self) -> None:
         """Wait until two more pictures have been drawn."""
-        self.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+        self.evaluate(
+            "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
+        )
 
     def images_have_failed(self) -> None:
         """Wait until an image without content has called its handler: handlers of those before it were called too."""
         broken = "image.src = 'data:image/png,none'"
-        self.evaluate(f"new Promise(done => {{ const image = new Image(); image.onerror = done; {broken}; }})")
+        self.evaluate(
+            f"new Promise(done => {{ const image = new Image(); image.onerror = done; {broken}; }})"
+        )
 
     def press(self, key: str, modifiers: int = 0) -> None:
         """Press and release a key; modifiers: 1 Alt, 2 Control, 8 Shift."""
@@ -227,11 +243,17 @@ class Page(Connection):
         elif len(key) == 1:
             about["text"] = key
         self.call("Input.dispatchKeyEvent", type="keyDown", **about)
-        self.call("Input.dispatchKeyEvent", type="keyUp", **{k: v for k, v in about.items() if k != "text"})
+        self.call(
+            "Input.dispatchKeyEvent",
+            type="keyUp",
+            **{k: v for k, v in about.items() if k != "text"},
+        )
 
     def write(self, text: str) -> None:
         """Replace the text of the focused field, key by key, and press Enter."""
-        self.call("Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"])
+        self.call(
+            "Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"]
+        )
         for letter in text:
             self.press(letter)
         self.press("Enter")
@@ -248,7 +270,15 @@ class Page(Connection):
         """Move, press or release the mouse."""
         button = "none" if kind == "mouseMoved" and not down else "left"
         count = 0 if kind == "mouseMoved" else 1
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=int(down), clickCount=count)
+        self.call(
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            button=button,
+            buttons=int(down),
+            clickCount=count,
+        )
 
     def click(self, element: str) -> None:
         """Click on an element, a JavaScript expression, with the mouse."""
@@ -282,7 +312,9 @@ class Page(Connection):
         so, and else always before, whatever the machine does.
         """
         if fine:
-            self.until("!globalThis.dhkit?.stage?.software || dhkit.stage.fine || dhkit.lab?.state.control?.running")
+            self.until(
+                "!globalThis.dhkit?.stage?.software || dhkit.stage.fine || dhkit.lab?.state.control?.running"
+            )
         else:
             self.settle()
             self.evaluate("void globalThis.dhkit?.stage?.dirty?.()")

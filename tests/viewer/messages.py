@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.viewer.drawables import Lowered
-from dhkit.viewer.protocol import GHOST_FLAG, HEADER, LENGTH, VISIBLE_FLAG as FLAG, MessageType, ProtocolError, Samples
+from dhkit.viewer.protocol import (
+    GHOST_FLAG,
+    HEADER,
+    LENGTH,
+    VISIBLE_FLAG as FLAG,
+    MessageType,
+    ProtocolError,
+    Samples,
+)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,10 @@ def live(live_page):
         take_away(None)
     view.show(MAX_PANEL_MESSAGES[0])
     view.wait()
-    assert opened.evaluate("dhkit.stage.overlays.empty && document.getElementById('overlays').hidden") is True
+    assert (
+        opened.evaluate("dhkit.stage.overlays.empty && document.getElementById('overlays').hidden")
+        is True
+    )
     yield view, opened
     errors, opened.errors = opened.errors, []
     assert errors == []
@@ -122,7 +125,10 @@ def test_a_live_page_follows(live, signal_arm):
 
 @pytest.mark.parametrize("name", ["puma560", "stanford"])
 def test_every_drawn_part_stands_where_python_says_and_the_page_invents_no_nodes(page, name):
-    arm, in_view = library_robot(name), np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    arm, in_view = (
+        library_robot(name),
+        np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]]),
+    )
     q = np.random.default_rng(1).uniform(-1, 1, arm.n)
     parts = link_parts(arm)
     with View(arm) as view:
@@ -157,8 +163,12 @@ def test_a_motion_plays_pauses_and_draws_its_path(page, signal_arm, tmp_path):
         q = np.array([0.3, 0.0]) + time_ / 4 * np.array([1.5, 0.9])
         check_tool(page, picture, signal_arm, q)
         seen.append(orange(picture)[BETWEEN_PANELS].sum())
-        degrees = page.evaluate("[...document.querySelectorAll('#joints td')].map(cell => cell.textContent)")
-        assert [float(x[:-1].replace("\u2212", "-")) for x in degrees] == pytest.approx(np.degrees(q), abs=0.051)
+        degrees = page.evaluate(
+            "[...document.querySelectorAll('#joints td')].map(cell => cell.textContent)"
+        )
+        assert [float(x[:-1].replace("\u2212", "-")) for x in degrees] == pytest.approx(
+            np.degrees(q), abs=0.051
+        )
     assert seen == sorted(seen)
     assert seen[0] < 50 < seen[1] < seen[2] < seen[3]
     page.press("t")
@@ -238,7 +248,9 @@ def test_a_page_says_when_python_is_gone(page, signal_arm):
     ],
     ids=["small", "large"],
 )
-def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(page, signal_arm, tmp_path, layouts):
+def test_nothing_is_clipped_or_covered_and_every_control_has_a_name(
+    page, signal_arm, tmp_path, layouts
+):
     """Whether the readout is open is decided once, by the size of the page that is loaded."""
     page.resize(*layouts[0][0])
     view = View(signal_arm, frames=True)
@@ -267,7 +279,9 @@ def check_layout(page, size, dark):
             across = a["left"] < b["right"] and b["left"] < a["right"]
             assert not (across and a["top"] < b["bottom"] and b["top"] < a["bottom"]), where
     assert page.evaluate("document.documentElement.scrollWidth") <= size[0], where
-    edges = page.evaluate("[...document.querySelectorAll('#labels span')].map(s => s.getBoundingClientRect().right)")
+    edges = page.evaluate(
+        "[...document.querySelectorAll('#labels span')].map(s => s.getBoundingClientRect().right)"
+    )
     assert len(edges) == 3, where
     assert max(edges) <= size[0], where
     unnamed = page.evaluate(
@@ -294,9 +308,21 @@ def test_the_whole_page_works_by_keyboard(page, signal_arm, tmp_path):
     assert page.evaluate("dhkit.player.loop") is True
     names = []
     for _ in range(9):
-        page.call("Input.dispatchKeyEvent", type="keyDown", key="Tab", code="Tab", windowsVirtualKeyCode=9)
+        page.call(
+            "Input.dispatchKeyEvent", type="keyDown", key="Tab", code="Tab", windowsVirtualKeyCode=9
+        )
         names.append(page.evaluate("document.activeElement.id || document.activeElement.localName"))
-    assert names[:9] == ["summary", "frames", "trace", "reset", "play", "time", "speed", "loop", "body"]
+    assert names[:9] == [
+        "summary",
+        "frames",
+        "trace",
+        "reset",
+        "play",
+        "time",
+        "speed",
+        "loop",
+        "body",
+    ]
 
 
 BLUE = (0.0, 0.0, 1.0)
@@ -350,13 +376,20 @@ def test_an_ellipsoid_is_seen_around_the_tool(page, signal_arm, tmp_path):
     page.press("o")
     seen = (np.abs(picture - page.screenshot()).max(axis=-1) > 10)[BETWEEN_PANELS]
     assert seen.sum() > 5000  # px
-    assert np.linalg.norm(centre(seen) + np.array([0, BETWEEN_PANELS.start]) - projected(page, tool)) < PIXELS
+    assert (
+        np.linalg.norm(centre(seen) + np.array([0, BETWEEN_PANELS.start]) - projected(page, tool))
+        < PIXELS
+    )
     # What the page draws maps the unit ball as Python says, and its middle is the tool.
-    drawn = page.evaluate("dhkit.stage.overlays.layers.ellipsoids.group.children[0].matrix.elements")
+    drawn = page.evaluate(
+        "dhkit.stage.overlays.layers.ellipsoids.group.children[0].matrix.elements"
+    )
     T = np.reshape(drawn, (4, 4)).T
     assert np.abs(T[:3, 3] - tool).max() < FLOAT32
     lengths = np.linalg.norm(T[:3, :3], axis=0)
-    assert lengths[1] / lengths[0] == pytest.approx(ellipsoid.lengths[1] / ellipsoid.lengths[0], rel=1e-5)
+    assert lengths[1] / lengths[0] == pytest.approx(
+        ellipsoid.lengths[1] / ellipsoid.lengths[0], rel=1e-5
+    )
     check_tool(page, picture, signal_arm, q)
     assert hosts(page) == []
     assert page.errors == []
@@ -379,11 +412,16 @@ def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(live, signal
     view, page = live
     view.ghosts([MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]], BLUE)
     view.wait()
-    check_copies(page, "ghosts", node_transforms(signal_arm, [MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]]))
+    check_copies(
+        page, "ghosts", node_transforms(signal_arm, [MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]])
+    )
     picture = page.screenshot()
     assert shows_the_arm(picture)
     check_tool(page, picture, signal_arm, MAX_PANEL_MESSAGES[0])
-    for q in (MAX_PANEL_MESSAGES[1], MAX_PANEL_MESSAGES[2]):  # a bluish ball where each ghost's tool is
+    for q in (
+        MAX_PANEL_MESSAGES[1],
+        MAX_PANEL_MESSAGES[2],
+    ):  # a bluish ball where each ghost's tool is
         x, y = projected(page, world_to_tool(signal_arm, q)[:3, 3]).astype(int)
         r, g, b = picture[y, x]
         assert b > r + 25
@@ -419,7 +457,10 @@ def test_a_simulation_plays_with_its_reference_as_a_ghost(page, signal_arm, tmp_
             page.evaluate(f"dhkit.player.seek({time_})")
             picture = page.screenshot()
             share = time_ / 3.0
-            q, wanted = ((1 - share) * states[0] + share * states[-1] for states in (result.q, result.reference_q))
+            q, wanted = (
+                (1 - share) * states[0] + share * states[-1]
+                for states in (result.q, result.reference_q)
+            )
             check_copies(page, "companion", node_transforms(signal_arm, wanted))
             check_tool(page, picture, signal_arm, q)
             tools.append(projected(page, world_to_tool(signal_arm, wanted)[:3, 3]))
@@ -435,7 +476,10 @@ def test_a_simulation_plays_with_its_reference_as_a_ghost(page, signal_arm, tmp_
 
 def test_the_ghost_of_a_simulation_goes_with_it(live, signal_arm):
     view, page = live
-    for replay in (lambda: view.play(([0, 1], MAX_PANEL_MESSAGES[:2])), lambda: view.show(MAX_PANEL_MESSAGES[0])):
+    for replay in (
+        lambda: view.play(([0, 1], MAX_PANEL_MESSAGES[:2])),
+        lambda: view.show(MAX_PANEL_MESSAGES[0]),
+    ):
         view.play(apart(signal_arm))
         view.wait()
         assert page.evaluate("dhkit.stage.overlays.layers.companion.group.children.length") == 3

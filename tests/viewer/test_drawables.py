@@ -52,7 +52,9 @@ def test_a_capsule_and_a_ball_have_their_sizes(radius, length):
         (Sphere(exact(radius)), radius),
         (Capsule(exact(radius), exact(length)), radius + length / 2),
     ):
-        outline = part_object(Part(0, geometry, np.eye(4), "#123456"), "x")["geometries"][0]["points"]
+        outline = part_object(Part(0, geometry, np.eye(4), "#123456"), "x")["geometries"][0][
+            "points"
+        ]
         assert max(point["x"] for point in outline) == pytest.approx(radius, rel=1e-12)
         assert max(point["y"] for point in outline) == pytest.approx(tip, rel=1e-12)
         assert outline[0]["x"] == pytest.approx(0, abs=1e-12 * radius)
@@ -60,7 +62,9 @@ def test_a_capsule_and_a_ball_have_their_sizes(radius, length):
 
 
 def test_a_mesh_is_its_file_and_keeps_its_scale():
-    part = next(part for part in link_parts(library_robot("puma560")) if isinstance(part.geometry, Mesh))
+    part = next(
+        part for part in link_parts(library_robot("puma560")) if isinstance(part.geometry, Mesh)
+    )
     lowered = part_object(part, "x")["geometries"][0]
     assert lowered["format"] == "stl"
     assert lowered["data"].data == part.file.read_bytes()

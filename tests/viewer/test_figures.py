@@ -35,7 +35,9 @@ def test_every_robot_has_a_figure_whose_line_goes_through_its_frames(name):
     for point in [*world_to_frames(arm, q)[:, :3, 3], world_to_tool(arm, q)[:3, 3]]:
         assert np.abs(skeleton - point).max(axis=1).min() < ON_LINE
     spans = [np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
-    assert np.allclose(spans / np.max(spans), axes._box_aspect / np.max(axes._box_aspect))  # one metre is one length
+    assert np.allclose(
+        spans / np.max(spans), axes._box_aspect / np.max(axes._box_aspect)
+    )  # one metre is one length
     assert "[m]" in axes.get_xlabel()
 
 
@@ -53,7 +55,9 @@ def test_a_motion_is_drawn_with_its_units_and_its_path():
 
 
 def test_unknown_types_are_named():
-    with pytest.raises(TypeError, match="no figure of dict; expected one of Comparison, Description"):
+    with pytest.raises(
+        TypeError, match="no figure of dict; expected one of Comparison, Description"
+    ):
         plot({})
 
 
@@ -62,7 +66,10 @@ def test_unknown_types_are_named():
     [
         (lambda arm: plot_arm(arm, [0, 0]), r"q has shape \(2,\)"),
         (lambda arm: plot_arm(arm, np.zeros((2, 6))), r"q has shape \(2, 6\); expected \(6,\)"),
-        (lambda arm: plot_motion(arm, [0, 1], np.zeros((3, 6))), r"q has shape \(3, 6\); expected \(2, 6\)"),
+        (
+            lambda arm: plot_motion(arm, [0, 1], np.zeros((3, 6))),
+            r"q has shape \(3, 6\); expected \(2, 6\)",
+        ),
     ],
 )
 def test_wrong_arrays_are_named(call, complaint):
@@ -76,8 +83,12 @@ def test_a_figure_needs_no_display():
         "import sys; from dhkit.viewer import plot; from dhkit.description import library_robot;"
         "plot(library_robot('planar2r')).savefig('/dev/null', format='png'); print('matplotlib.pyplot' in sys.modules)"
     )
-    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND")}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MPLBACKEND")
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
     assert done.stdout.strip() == "False"
 
 

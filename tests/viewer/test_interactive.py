@@ -40,7 +40,13 @@ HOSTILE = '<img src=x onerror="globalThis.hacked=1"></script><!--<script>'
 def open_page(chromium, file, width, height):
     """Open an interactive page that has no network."""
     page = chromium.page(width=width, height=height)
-    page.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
+    page.call(
+        "Network.emulateNetworkConditions",
+        offline=True,
+        latency=0,
+        downloadThroughput=0,
+        uploadThroughput=0,
+    )
     page.open(f"file://{file}")
     page.until("dhkit.lab?.state.tool && dhkit.lab.state.table")
     return page
@@ -50,7 +56,9 @@ def check_errors_and_requests(page):
     """Check that a page has met no error and asked nobody; forget the errors."""
     errors, page.errors = page.errors, []
     assert errors == []
-    assert [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))] == []
+    assert [
+        url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))
+    ] == []
 
 
 @pytest.fixture
@@ -117,7 +125,9 @@ def kept_page(kept_pages):
         used.append(page)
         page.evaluate("dhkit.lab.ask('table.reset', {})")
         page.evaluate(f"dhkit.lab.ask('joints.set', {{ q: {json.dumps(q)} }})")
-        page.evaluate("dhkit.lab.setUnits({ angle: 'deg', length: 'm' }), dhkit.lab.openPanel('joints')")
+        page.evaluate(
+            "dhkit.lab.setUnits({ angle: 'deg', length: 'm' }), dhkit.lab.openPanel('joints')"
+        )
         return page
 
     yield make
@@ -129,7 +139,13 @@ def table(arm):
     """Return an arm's table as the page has it."""
     n = arm.description.numbers
     rows = [
-        {"kind": "P" if n.prismatic[i] else "R", "theta": n.theta[i], "d": n.d[i], "a": n.a[i], "alpha": n.alpha[i]}
+        {
+            "kind": "P" if n.prismatic[i] else "R",
+            "theta": n.theta[i],
+            "d": n.d[i],
+            "a": n.a[i],
+            "alpha": n.alpha[i],
+        }
         for i in range(arm.n)
     ]
     return {
@@ -177,7 +193,9 @@ def test_its_kinematics_are_those_of_python_in_random_states_of_all_kinds_of_arm
         q = rng.uniform(-math.pi, math.pi, (each, arm.n))
         expected = np.concatenate([arm.frames(q), arm.fk(q)[:, None]], axis=1)
         worst = max(worst, float(np.abs(in_page(plain, arm, q) - expected).max()))
-    print(f"kinematics of the page: {worst:.1e} from Python's in {each * len(arms)} states of {len(arms)} arms")
+    print(
+        f"kinematics of the page: {worst:.1e} from Python's in {each * len(arms)} states of {len(arms)} arms"
+    )
     assert worst < CLOSE
 
 
@@ -192,7 +210,9 @@ def test_its_kinematics_and_those_of_python_are_those_of_pinocchio(plain):
 
 def test_its_euler_angles_are_those_of_python(plain):
     arm, rng = Arm.load("puma560"), np.random.default_rng(3)
-    q = np.concatenate([rng.uniform(-3, 3, (30, 6)), np.zeros((1, 6)), np.full((1, 6), math.pi / 2)])
+    q = np.concatenate(
+        [rng.uniform(-3, 3, (30, 6)), np.zeros((1, 6)), np.full((1, 6), math.pi / 2)]
+    )
     T = arm.fk(q)
     for order in ORDERS:
         found = plain.evaluate(
@@ -250,7 +270,10 @@ def button(text):
 
 def tab(page, name):
     # A click on the panel that is open hides it.
-    if page.evaluate(f"document.getElementById('tab-{name}').getAttribute('aria-selected')") != "true":
+    if (
+        page.evaluate(f"document.getElementById('tab-{name}').getAttribute('aria-selected')")
+        != "true"
+    ):
         page.click(f"document.getElementById('tab-{name}')")
 
 
@@ -288,19 +311,28 @@ def test_joints_tool_and_table_follow_every_control(kept_page, name):
         assert moved[i] == pytest.approx(11e-3 if slides else math.radians(11), abs=1e-9)
         assert np.abs(np.delete(moved, i)).max(initial=0) == 0
     write(page, f"{names[1]}, value", "12.5")
-    assert told(page, "joints.q")[1] == pytest.approx(math.radians(12.5) if arm.description.kinds[1] == "R" else 12.5)
+    assert told(page, "joints.q")[1] == pytest.approx(
+        math.radians(12.5) if arm.description.kinds[1] == "R" else 12.5
+    )
     tool_is(page, arm)
     for configuration in ("random", "zero"):
         page.click(button(configuration))
         q = tool_is(page, arm)
         numbers = arm.description.numbers
-        assert (configuration == "zero" and not q.any()) or ((numbers.lower <= q) & (q <= numbers.upper)).all()
+        assert (configuration == "zero" and not q.any()) or (
+            (numbers.lower <= q) & (q <= numbers.upper)
+        ).all()
 
     tab(page, "tool")
     for order in ("ZYZ", "xyz"):
         page.choose(labelled("Convention of Euler angles"), order)
-        assert np.abs(np.array(told(page, "tool.euler")) - pose_parts(arm.fk(q), order=order)[1]).max() < 1e-9
-    assert page.evaluate("[...document.querySelectorAll('#panel-tool input')].every(x => x.readOnly)")
+        assert (
+            np.abs(np.array(told(page, "tool.euler")) - pose_parts(arm.fk(q), order=order)[1]).max()
+            < 1e-9
+        )
+    assert page.evaluate(
+        "[...document.querySelectorAll('#panel-tool input')].every(x => x.readOnly)"
+    )
     assert "0." in page.evaluate("document.querySelector('#panel-tool math').textContent")
 
     tab(page, "table")
@@ -311,7 +343,10 @@ def test_joints_tool_and_table_follow_every_control(kept_page, name):
     assert page.evaluate(f"{labelled('alpha of row 2')}.getAttribute('aria-invalid')") == "true"
     tool_is(page, edited)
     page.click(button("Undo"))
-    page.choose(labelled("Convention"), "modified" if arm.description.convention.value == "standard" else "standard")
+    page.choose(
+        labelled("Convention"),
+        "modified" if arm.description.convention.value == "standard" else "standard",
+    )
     other = "modified" if arm.description.convention.value == "standard" else "standard"
     switched = Arm(replace(edited.description, convention=type(arm.description.convention)(other)))
     tool_is(page, switched)
@@ -325,7 +360,9 @@ def test_joints_tool_and_table_follow_every_control(kept_page, name):
     A = page.evaluate("document.querySelectorAll('#panel-table .step li').length")
     assert A == 4
     page.click("document.querySelector('#panel-table button[aria-pressed]')")
-    assert page.evaluate("!document.getElementById('labels').hidden && dhkit.stage.triads.some(t => t?.visible)")
+    assert page.evaluate(
+        "!document.getElementById('labels').hidden && dhkit.stage.triads.some(t => t?.visible)"
+    )
 
 
 def with_entry(arm, row, column, text):
@@ -346,7 +383,9 @@ def test_the_steps_of_a_row_are_those_of_the_lab(kept_page, name):
                 lab.answer("table.steps", {"row": row}),
                 page.evaluate(f"dhkit.lab.ask('table.steps', {{ row: {row} }})"),
             )
-            assert [step["title"] for step in ours["steps"]] == [step["title"] for step in theirs["steps"]]
+            assert [step["title"] for step in ours["steps"]] == [
+                step["title"] for step in theirs["steps"]
+            ]
             for one, other in zip(ours["steps"], theirs["steps"], strict=True):
                 assert np.abs(np.subtract(one["T"], other["T"])).max() < CLOSE
             assert np.abs(np.subtract(ours["A"], theirs["A"])).max() < CLOSE
@@ -360,7 +399,10 @@ def test_an_edited_arm_has_the_labels_that_python_gives_it(kept_page):
     from dhkit.viewer.scene import frame_labels
 
     expected = [label.text for label in frame_labels(edited.description)]
-    assert page.evaluate("[...document.querySelectorAll('#labels span')].map(s => s.textContent)") == expected
+    assert (
+        page.evaluate("[...document.querySelectorAll('#labels span')].map(s => s.textContent)")
+        == expected
+    )
 
 
 def test_motions_are_listed_played_and_drawn_with_their_curves(visit):
@@ -376,7 +418,10 @@ def test_motions_are_listed_played_and_drawn_with_their_curves(visit):
     page.evaluate("dhkit.player.pause(), dhkit.player.seek(1.0)")
     middle = motions["there"].q(1.0)
     assert (
-        np.abs(np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()")) - arm.fk(middle)[:3, 3]).max()
+        np.abs(
+            np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()"))
+            - arm.fk(middle)[:3, 3]
+        ).max()
         < 1e-4
     )
     page.click(button("back"))
@@ -384,27 +429,44 @@ def test_motions_are_listed_played_and_drawn_with_their_curves(visit):
     page.until("document.querySelectorAll('#dock .plot canvas').length >= 2")
     page.evaluate("dhkit.player.pause(), dhkit.player.seek(0)")
     assert (
-        np.abs(np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()")) - arm.fk(q + 0.5)[:3, 3]).max()
+        np.abs(
+            np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()"))
+            - arm.fk(q + 0.5)[:3, 3]
+        ).max()
         < 1e-5
     )
     # A slider ends a motion where it is, and the table carries it over to another arm.
     tab(page, "joints")
     page.evaluate(f"{labelled('waist')}.focus()")
     page.press("ArrowRight")
-    assert np.abs(np.array(told(page, "joints.q")) - (q + 0.5) - [math.radians(1), 0, 0, 0, 0, 0]).max() < SAVED
+    assert (
+        np.abs(
+            np.array(told(page, "joints.q")) - (q + 0.5) - [math.radians(1), 0, 0, 0, 0, 0]
+        ).max()
+        < SAVED
+    )
     assert not page.evaluate("dhkit.player.active")
     page.evaluate("dhkit.lab.ask('table.edit', { row: 1, column: 'a', text: '0.6' })")
     page.evaluate("dhkit.lab.ask('motion.play', { index: 1 })")
     page.evaluate("dhkit.player.pause(), dhkit.player.seek(1)")
     tip = with_entry(arm, 1, "a", "0.6").fk(q)[:3, 3]
-    assert np.abs(np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()")) - tip).max() < 1e-5
+    assert (
+        np.abs(np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()")) - tip).max()
+        < 1e-5
+    )
 
 
 def test_texts_are_texts_and_end_no_script(visit):
     view = View(Arm.load("planar2r").description)
     view.ghosts([[0.1, 0.2]], names=[HOSTILE])
     motions = {HOSTILE: ([0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]])}
-    page = visit(view, title=HOSTILE, caption=f"one\n{HOSTILE}", links={HOSTILE: "other.html"}, motions=motions)
+    page = visit(
+        view,
+        title=HOSTILE,
+        caption=f"one\n{HOSTILE}",
+        links={HOSTILE: "other.html"},
+        motions=motions,
+    )
     assert page.evaluate("document.title") == HOSTILE
     said = page.evaluate(
         "[...document.querySelectorAll('#panel-about p, #panel-about li, #panel-about a')].map(e => e.textContent)"
@@ -440,7 +502,9 @@ UNNAMED = (
 )
 
 
-@pytest.mark.parametrize("sizes", [[(390, 844)], [(768, 1024), (1280, 800)]], ids=["small", "large"])
+@pytest.mark.parametrize(
+    "sizes", [[(390, 844)], [(768, 1024), (1280, 800)]], ids=["small", "large"]
+)
 def test_nothing_is_cut_off_and_all_is_named(visit, sizes):
     """Whether the readout is open is decided once, by the size of the page that is loaded."""
     arm = Arm.load("puma560")
@@ -489,11 +553,17 @@ def test_links_lead_to_pages_alone(links, error):
 
 
 def test_relative_and_web_addresses_are_links(visit):
-    links = {"a": "other.html", "b": "a/b.html#c", "c": "https://example.org/x:y", "d": "mailto:a@b.org", "e": "?q=a:b"}
+    links = {
+        "a": "other.html",
+        "b": "a/b.html#c",
+        "c": "https://example.org/x:y",
+        "d": "mailto:a@b.org",
+        "e": "?q=a:b",
+    }
     page = visit(View(Arm.load("planar2r").description), links=links, caption="links")
-    assert page.evaluate("[...document.querySelectorAll('#panel-about a')].map(a => a.getAttribute('href'))") == list(
-        links.values()
-    )
+    assert page.evaluate(
+        "[...document.querySelectorAll('#panel-about a')].map(a => a.getAttribute('href'))"
+    ) == list(links.values())
 
 
 def test_a_long_motion_and_a_short_excess_are_told():
@@ -512,10 +582,16 @@ def test_a_long_motion_and_a_short_excess_are_told():
 
 def test_entries_that_nobody_changed_are_not_read_again(visit):
     arm = Arm(
-        from_dh([(0, 0, 0.3, 0), (0, 0, "abs(l1)", 0)], order=("theta", "d", "a", "alpha"), parameters={"l1": -0.4})
+        from_dh(
+            [(0, 0, 0.3, 0), (0, 0, "abs(l1)", 0)],
+            order=("theta", "d", "a", "alpha"),
+            parameters={"l1": -0.4},
+        )
     )
     page = visit(View(arm.description))
-    assert page.evaluate("dhkit.lab.ask('table.edit', { row: 0, column: 'a', text: '0.5' })") == {"error": None}
+    assert page.evaluate("dhkit.lab.ask('table.edit', { row: 0, column: 'a', text: '0.5' })") == {
+        "error": None
+    }
     tool_is(page, with_entry(arm, 0, "a", "0.5"))
     # A good entry counts also where it was typed while another was bad.
     page.evaluate("dhkit.lab.ask('table.edit', { row: 0, column: 'a', text: 'x' })")

@@ -36,7 +36,11 @@ def test_samples_lie_on_the_motion_with_its_ends(count, duration, seed):
         ([0, 1], [0, 0], r"q has shape \(2,\)"),
         ([0, 0], [[0, 0], [1, 1]], r"times\[0\] is 0 s, times\[1\] is 0 s"),
         ([0, 2, 1], np.zeros((3, 2)), r"times\[1\] is 2 s, times\[2\] is 1 s"),
-        ([0, np.nan], np.zeros((2, 2)), r"times has values that are not finite, the first in row 1"),
+        (
+            [0, np.nan],
+            np.zeros((2, 2)),
+            r"times has values that are not finite, the first in row 1",
+        ),
         ([0, 1], [[0, 0], [0, np.inf]], r"q has values that are not finite, the first in row 1"),
     ],
 )

@@ -26,7 +26,9 @@ VIEW = "application/vnd.jupyter.widget-view+json"
 @pytest.fixture
 def without_anywidget(monkeypatch):
     find = importlib.util.find_spec
-    monkeypatch.setattr(notebook, "find_spec", lambda name: None if name == "anywidget" else find(name))
+    monkeypatch.setattr(
+        notebook, "find_spec", lambda name: None if name == "anywidget" else find(name)
+    )
     notebook._widget_class.cache_clear()
     yield
     notebook._widget_class.cache_clear()
@@ -100,7 +102,10 @@ def test_the_widget_moves_the_arm_in_the_frame_and_strangers_do_not(chromium, tm
     try:
         page.call("Page.navigate", url=f"file://{tmp_path}/notebook.html")
         page.until("globalThis.close && document.querySelector('#one iframe')")
-        assert page.evaluate("document.querySelector('#one iframe').getAttribute('sandbox')") == "allow-scripts"
+        assert (
+            page.evaluate("document.querySelector('#one iframe').getAttribute('sandbox')")
+            == "allow-scripts"
+        )
         pictures = []
         # What comes before the page in the frame is ready waits for it.
         for q in ([0.4, 0.2], [-0.9, 0.9]):

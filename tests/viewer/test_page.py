@@ -34,7 +34,10 @@ def test_an_offline_page_holds_its_messages_and_no_address():
     assert [base64.b64decode(x) for x in json.loads(data)] == [b"\x01\x02", b"</script>"]
     assert "<title>a &lt; b &amp; c</title>" in text
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
-    assert set(re.findall(r"(?:https?|wss?)://[\w.]+", text)) <= {"http://www.w3.org", "https://feross.org"}
+    assert set(re.findall(r"(?:https?|wss?)://[\w.]+", text)) <= {
+        "http://www.w3.org",
+        "https://feross.org",
+    }
 
 
 @pytest.mark.parametrize(
@@ -59,6 +62,8 @@ def test_a_missing_viewer_is_named(monkeypatch, tmp_path, spec, content, complai
 
 def test_the_page_draws_in_the_colors_of_python():
     script = (resources.files("dhkit.viewer") / "static" / "colors.js").read_text("utf-8")
-    _, axes, ghosts, grey = (re.findall(r'"(#[0-9a-f]{6})"', part) for part in script.split("export const"))
+    _, axes, ghosts, grey = (
+        re.findall(r'"(#[0-9a-f]{6})"', part) for part in script.split("export const")
+    )
     assert (tuple(axes), tuple(ghosts)) == (AXIS_COLORS, TINTS)
     assert (*TINTS[:6], *grey) == CURVE_COLORS

@@ -25,7 +25,11 @@ def by_pixel(corners, colors, image):
                 (a, b, c), depths = triangle[:, :2], triangle[:, 2]
                 whole = np.linalg.det([b - a, c - a])
                 weights = np.array(
-                    [np.linalg.det([b - p, c - p]), np.linalg.det([c - p, a - p]), np.linalg.det([a - p, b - p])]
+                    [
+                        np.linalg.det([b - p, c - p]),
+                        np.linalg.det([c - p, a - p]),
+                        np.linalg.det([a - p, b - p]),
+                    ]
                 )
                 weights = weights / whole
                 if (weights > 1e-9).all() and weights @ (1 / depths) > nearest[y, x]:
@@ -36,7 +40,9 @@ def by_pixel(corners, colors, image):
 
 def test_each_pixel_has_the_color_of_the_nearest_triangle():
     rng = np.random.default_rng(4)
-    corners = np.concatenate([rng.uniform(-8, 32, (12, 3, 2)), rng.uniform(1, 5, (12, 3, 1))], axis=2)
+    corners = np.concatenate(
+        [rng.uniform(-8, 32, (12, 3, 2)), rng.uniform(1, 5, (12, 3, 1))], axis=2
+    )
     colors, image = rng.integers(0, 255, (12, 3)).astype(float), np.full((20, 24, 3), 250, np.uint8)
     assert np.array_equal(_rasterize(corners, colors, image), by_pixel(corners, colors, image))
 
@@ -44,9 +50,18 @@ def test_each_pixel_has_the_color_of_the_nearest_triangle():
 def test_neighbours_leave_no_gap_between_them():
     points = np.array([[3.5, 2.5], [17.25, 4.0], [16.0, 15.5], [2.0, 14.0]])
     corners = np.array(
-        [[*points[0], 2], [*points[1], 2], [*points[2], 2], [*points[0], 2], [*points[2], 2], [*points[3], 2]]
+        [
+            [*points[0], 2],
+            [*points[1], 2],
+            [*points[2], 2],
+            [*points[0], 2],
+            [*points[2], 2],
+            [*points[3], 2],
+        ]
     )
-    drawn = _rasterize(corners.reshape(2, 3, 3), np.zeros((2, 3)), np.full((20, 20, 3), 255, np.uint8))
+    drawn = _rasterize(
+        corners.reshape(2, 3, 3), np.zeros((2, 3)), np.full((20, 20, 3), 255, np.uint8)
+    )
     for row in drawn[..., 0]:
         dark = np.flatnonzero(row == 0)
         assert len(dark) == 0 or len(dark) == dark[-1] - dark[0] + 1
@@ -54,7 +69,9 @@ def test_neighbours_leave_no_gap_between_them():
 
 @pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_the_whole_arm_is_in_view_and_fills_it(name):
-    image = np.asarray(picture(Arm.load(name).description, size=(200, 150), frames=True)).astype(int)
+    image = np.asarray(picture(Arm.load(name).description, size=(200, 150), frames=True)).astype(
+        int
+    )
     differs = np.abs(image - GROUND_COLOR).max(axis=-1) > 60  # the grid differs by less
     rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
     assert rows[0] > 0
@@ -67,7 +84,8 @@ def test_the_whole_arm_is_in_view_and_fills_it(name):
 def test_a_picture_is_that_of_its_state():
     arm = Arm.load("planar2r")
     one, same, other = (
-        np.asarray(picture(arm.description, q, size=(160, 120))) for q in ([0.2, 0.4], [0.2, 0.4], [1.2, 0.4])
+        np.asarray(picture(arm.description, q, size=(160, 120)))
+        for q in ([0.2, 0.4], [0.2, 0.4], [1.2, 0.4])
     )
     assert np.array_equal(one, same)
     assert not np.array_equal(one, other)
@@ -78,10 +96,14 @@ def test_a_ghost_is_paler_than_the_arm_and_behind_it():
     q = np.array([0.2, 0.4])
     here = node_transforms(arm.description, q)
     plain = np.asarray(picture(arm.description, q, size=(160, 120)))
-    hidden = np.asarray(picture(arm.description, q, size=(160, 120), ghosts=[Ghost(here, (255, 0, 0))]))
+    hidden = np.asarray(
+        picture(arm.description, q, size=(160, 120), ghosts=[Ghost(here, (255, 0, 0))])
+    )
     assert np.abs(plain.astype(int) - hidden).max() < 60  # only its smoothed edges are seen
     there = node_transforms(arm.description, q + 1.0)
-    seen = np.asarray(picture(arm.description, q, size=(160, 120), ghosts=[Ghost(there, (255, 0, 0))])).astype(int)
+    seen = np.asarray(
+        picture(arm.description, q, size=(160, 120), ghosts=[Ghost(there, (255, 0, 0))])
+    ).astype(int)
     assert ((seen[..., 0] - seen[..., 1] > 40) & (seen[..., 1] > 120)).sum() > 30
 
 
@@ -112,7 +134,11 @@ def test_a_gif_lasts_as_long_as_its_motion_though_its_times_are_whole_hundredths
     arm = library_robot("planar2r")
     times = np.linspace(0, 1.0, 101)
     path = write_motion_gif(
-        arm, (times, np.stack([times, -times], axis=1)), tmp_path / "a.gif", rate=rate, size=(64, 48)
+        arm,
+        (times, np.stack([times, -times], axis=1)),
+        tmp_path / "a.gif",
+        rate=rate,
+        size=(64, 48),
     )
     with Image.open(path) as gif:
         shown = [gif.seek(k) or gif.info["duration"] for k in range(gif.n_frames)]
@@ -120,7 +146,9 @@ def test_a_gif_lasts_as_long_as_its_motion_though_its_times_are_whole_hundredths
 
 
 def test_a_motion_shorter_than_a_picture_has_two(tmp_path):
-    path = write_motion_gif(library_robot("planar2r"), ([0, 0.01], [[0, 0], [1, 1]]), tmp_path / "a.gif", size=(64, 48))
+    path = write_motion_gif(
+        library_robot("planar2r"), ([0, 0.01], [[0, 0], [1, 1]]), tmp_path / "a.gif", size=(64, 48)
+    )
     with Image.open(path) as gif:
         assert gif.n_frames == 2
 
@@ -138,22 +166,30 @@ def test_a_gif_plays_the_motion_in_real_time(tmp_path):
     with Image.open(one) as gif:
         assert (gif.n_frames, gif.info["duration"], gif.info["loop"]) == (13, 100, 0)
         last = gif.seek(12) or np.asarray(gif.convert("RGB")).astype(int)
-    expected = np.asarray(list(pictures(arm.description, motion.q(np.array([0.0, 1.2])), size=(160, 120)))[-1]).astype(
-        int
-    )
+    expected = np.asarray(
+        list(pictures(arm.description, motion.q(np.array([0.0, 1.2])), size=(160, 120)))[-1]
+    ).astype(int)
     assert np.median(np.abs(last - expected)) < 8  # of 128 colors
 
 
 def test_the_reference_of_a_simulation_moves_along(tmp_path):
     arm = Arm.load("planar2r")
     run = arm.simulate(PDGravity.tuned(arm, 4.0), arm.quintic([0.0, 0.2], [1.5, 0.9], 0.5))
-    with_ghost = write_motion_gif(arm.description, run, tmp_path / "run.gif", rate=10, size=(160, 120))
-    without = write_motion_gif(arm.description, (run.t, run.q), tmp_path / "plain.gif", rate=10, size=(160, 120))
+    with_ghost = write_motion_gif(
+        arm.description, run, tmp_path / "run.gif", rate=10, size=(160, 120)
+    )
+    without = write_motion_gif(
+        arm.description, (run.t, run.q), tmp_path / "plain.gif", rate=10, size=(160, 120)
+    )
     with Image.open(with_ghost) as one, Image.open(without) as other:
         one.seek(3), other.seek(3)
         assert (
             np.any(
-                np.abs(np.asarray(one.convert("RGB")).astype(int) - np.asarray(other.convert("RGB"))) > 25, axis=-1
+                np.abs(
+                    np.asarray(one.convert("RGB")).astype(int) - np.asarray(other.convert("RGB"))
+                )
+                > 25,
+                axis=-1,
             ).sum()
             > 30
         )
@@ -161,7 +197,9 @@ def test_the_reference_of_a_simulation_moves_along(tmp_path):
 
 def test_pictures_of_a_motion_are_numbered(tmp_path):
     arm = Arm.load("planar2r")
-    paths = write_motion_pngs(arm.description, ([0, 1], [[0, 0], [1, 1]]), tmp_path / "m.png", count=11, size=(80, 60))
+    paths = write_motion_pngs(
+        arm.description, ([0, 1], [[0, 0], [1, 1]]), tmp_path / "m.png", count=11, size=(80, 60)
+    )
     assert [path.name for path in paths] == [f"m-{k:02}.png" for k in range(1, 12)]
     first, last = (np.asarray(Image.open(path)) for path in (paths[0], paths[-1]))
     assert not np.array_equal(first, last)

@@ -33,14 +33,23 @@ def test_a_pose_comes_back(data, n, time):
     assert np.array_equal(pose.q, q)
     assert np.array_equal(pose.transforms, T[:, :3])
     header = messages.decode_header(message)
-    assert (header.type, header.joints, header.sequence, header.time) == (MessageType.POSE, n, 0, time)
+    assert (header.type, header.joints, header.sequence, header.time) == (
+        MessageType.POSE,
+        n,
+        0,
+        time,
+    )
 
 
 @given(st.data(), joints, st.integers(1, 5), st.booleans(), st.booleans())
 def test_an_animation_comes_back(data, n, count, trace, accompanied):
     times = np.sort(data.draw(arrays(float, count, elements=st.floats(0, 1e5))))
     q, T = drawn(data.draw, count, n), drawn(data.draw, count, n + 2, 4, 4)
-    ghost = (drawn(data.draw, count, n + 2, 4, 4), np.array([1, 2, 3], dtype=np.uint8)) if accompanied else None
+    ghost = (
+        (drawn(data.draw, count, n + 2, 4, 4), np.array([1, 2, 3], dtype=np.uint8))
+        if accompanied
+        else None
+    )
     message = protocol.encode_animation(times, q, T, trace=trace, ghost=ghost)
     back = messages.decode_animation(message)
     assert (back.ghost is not None) == accompanied
@@ -83,7 +92,11 @@ def test_ghosts_come_back(data, n, count):
 
 @given(st.data(), st.integers(0, 5))
 def test_obstacles_come_back(data, count):
-    T, half_edges, radii = drawn(data.draw, count, 4, 4), drawn(data.draw, count, 3), drawn(data.draw, count)
+    T, half_edges, radii = (
+        drawn(data.draw, count, 4, 4),
+        drawn(data.draw, count, 3),
+        drawn(data.draw, count),
+    )
     back = messages.decode_obstacles(protocol.encode_obstacles(T, half_edges, radii))
     assert np.array_equal(back.transforms, T[:, :3])
     assert np.array_equal(back.half_edges, half_edges)
@@ -153,7 +166,10 @@ def test_an_acknowledgement_is_read(sequence):
         (f'{{"type": "request", "id": 1, "name": "{"x" * 41}"}}', "expected the name of a request"),
         ('{"type": "request", "id": 1, "name": "x", "data": [1]}', "data is list"),
         ('{"type": "request", "id": 1, "name": "x", "data": {"q": [NaN]}}', "not JSON"),
-        ('{"type": "request", "id": 1, "name": "x", "data": {"q": [[[[[[[1]]]]]]]}}', "nested 6 levels at most"),
+        (
+            '{"type": "request", "id": 1, "name": "x", "data": {"q": [[[[[[[1]]]]]]]}}',
+            "nested 6 levels at most",
+        ),
     ],
 )
 def test_what_is_no_message_is_named(text, complaint):
@@ -162,19 +178,33 @@ def test_what_is_no_message_is_named(text, complaint):
 
 
 def test_header_is_sixteen_bytes_little_endian():
-    assert protocol.stamped(protocol.encode_trace(np.zeros((0, 3))), 7) == struct.pack("<BBHId", 4, 0, 0, 7, 0.0)
+    assert protocol.stamped(protocol.encode_trace(np.zeros((0, 3))), 7) == struct.pack(
+        "<BBHId", 4, 0, 0, 7, 0.0
+    )
 
 
 def test_requests_states_and_samples_come_back():
     text = '{"type": "request", "id": 3, "name": "joints.set", "data": {"q": [0.5, 1]}}'
     assert decode_message(text) == Request(3, "joints.set", {"q": [0.5, 1]})
-    assert decode_state(encode_state("arm", {"name": "<b>ä", "n": 2})) == ("arm", {"name": "<b>ä", "n": 2})
-    first = Samples("control", ("t", "e1"), np.arange(6, dtype=np.float32).reshape(3, 2), restart=True)
+    assert decode_state(encode_state("arm", {"name": "<b>ä", "n": 2})) == (
+        "arm",
+        {"name": "<b>ä", "n": 2},
+    )
+    first = Samples(
+        "control", ("t", "e1"), np.arange(6, dtype=np.float32).reshape(3, 2), restart=True
+    )
     both = first.followed_by(Samples("control", ("t", "e1"), np.ones((1, 2), np.float32)))
     found = decode_samples(both.encoded())
-    assert (found.name, found.columns, found.restart, found.rows.shape) == ("control", ("t", "e1"), True, (4, 2))
+    assert (found.name, found.columns, found.restart, found.rows.shape) == (
+        "control",
+        ("t", "e1"),
+        True,
+        (4, 2),
+    )
     assert np.array_equal(found.rows, both.rows)
-    many = both.followed_by(Samples("control", ("t", "e1"), np.zeros((BOUNDS.sample_numbers, 2), np.float32)))
+    many = both.followed_by(
+        Samples("control", ("t", "e1"), np.zeros((BOUNDS.sample_numbers, 2), np.float32))
+    )
     assert many.rows.size == BOUNDS.sample_numbers
     anew = both.followed_by(Samples("control", ("t", "e1", "e2"), np.zeros((1, 3), np.float32)))
     assert anew.restart and anew.rows.shape == (1, 3)

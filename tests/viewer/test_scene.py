@@ -4,9 +4,24 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from dhkit.description import Capsule, Cylinder, Mesh, from_dh, library_robot, robots, world_to_frames, world_to_tool
+from dhkit.description import (
+    Capsule,
+    Cylinder,
+    Mesh,
+    from_dh,
+    library_robot,
+    robots,
+    world_to_frames,
+    world_to_tool,
+)
 from dhkit.model.shapes import link_parts
-from dhkit.viewer.scene import build_scene, first_configuration, frame_labels, node_transforms, scene_size
+from dhkit.viewer.scene import (
+    build_scene,
+    first_configuration,
+    frame_labels,
+    node_transforms,
+    scene_size,
+)
 from random_arms import states, tables
 
 ROUNDING = 1e-13  # times the arm's size: two orders of one product of a dozen matrices
@@ -15,7 +30,11 @@ EVERY_STATE = 5
 
 def transforms_by_path(commands):
     """Return the last transform set at every path."""
-    return {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in commands if c["type"] == "set_transform"}
+    return {
+        c["path"]: np.reshape(c["matrix"], (4, 4)).T
+        for c in commands
+        if c["type"] == "set_transform"
+    }
 
 
 def objects_by_path(commands):
@@ -48,7 +67,9 @@ def check_parts(arm, q):
     commands = build_scene(arm, parts).commands
     fixed, drawn = transforms_by_path(commands), objects_by_path(commands)
     nodes, frames = node_transforms(arm, q), world_to_frames(arm, q)
-    paths = iter(sorted((path for path in drawn if "/part" in path), key=lambda path: by_number(path)))
+    paths = iter(
+        sorted((path for path in drawn if "/part" in path), key=lambda path: by_number(path))
+    )
     by_link = sorted(range(len(parts)), key=lambda k: parts[k].link)
     for part in (parts[k] for k in by_link):
         path = next(paths)
@@ -86,7 +107,9 @@ def test_shapes_of_a_file_keep_their_axis_and_color(signal_arm):
 def test_nodes_begin_in_the_first_configuration(arm):
     fixed = transforms_by_path(build_scene(arm, link_parts(arm)).commands)
     nodes = node_transforms(arm, first_configuration(arm))
-    for path, T in zip([*(f"/dhkit/link{i}" for i in range(arm.n + 1)), "/dhkit/tool"], nodes, strict=True):
+    for path, T in zip(
+        [*(f"/dhkit/link{i}" for i in range(arm.n + 1)), "/dhkit/tool"], nodes, strict=True
+    ):
         assert np.array_equal(fixed[path], T)
 
 
@@ -122,7 +145,9 @@ def test_up_is_against_gravity():
 
 def test_triads_are_hidden_at_first():
     commands = build_scene(library_robot("ur5"), ()).commands
-    triads = {c["path"] for c in commands if c["type"] == "set_object" and c["path"].endswith("/frame")}
+    triads = {
+        c["path"] for c in commands if c["type"] == "set_object" and c["path"].endswith("/frame")
+    }
     hidden = {c["path"] for c in commands if c["type"] == "set_property" and c["value"] is False}
     assert triads == hidden
     assert triads
@@ -132,4 +157,6 @@ def test_equal_arms_are_equal_bytes():
     from dhkit.viewer.protocol import encode_scene
 
     arm = library_robot("ur5")
-    assert encode_scene(build_scene(arm, link_parts(arm))) == encode_scene(build_scene(arm, link_parts(arm)))
+    assert encode_scene(build_scene(arm, link_parts(arm))) == encode_scene(
+        build_scene(arm, link_parts(arm))
+    )

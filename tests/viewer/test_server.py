@@ -49,7 +49,9 @@ def get(server, path, **headers):
 async def connect(server, **headers):
     headers = {"Origin": f"http://127.0.0.1:{server.port}", **headers}
     url = server.url.replace("http", "ws") + "socket"
-    socket = await websocket_connect(HTTPRequest(url, headers={k: v for k, v in headers.items() if v}))
+    socket = await websocket_connect(
+        HTTPRequest(url, headers={k: v for k, v in headers.items() if v})
+    )
     yield socket
     socket.close()
     while await asyncio.wait_for(socket.read_message(), HANGS) is not None:
@@ -114,13 +116,17 @@ def test_a_foreign_host_or_origin_is_refused(server, name, headers):
     assert server.token.encode() not in content
 
 
-@pytest.mark.parametrize("path", ["/", "/main.js", "//", "/x/", "/socket", "/{half}/", "/{token}x/main.js"])
+@pytest.mark.parametrize(
+    "path", ["/", "/main.js", "//", "/x/", "/socket", "/{half}/", "/{token}x/main.js"]
+)
 def test_a_missing_token_is_refused(server, path):
     path = path.format(token=server.token, half=server.token[:8])
     assert get(server, path)[0] == 403
 
 
-@pytest.mark.parametrize("name", ["../server.py", "%2e%2e/server.py", "index.html", "static/main.js", "favicon.ico"])
+@pytest.mark.parametrize(
+    "name", ["../server.py", "%2e%2e/server.py", "index.html", "static/main.js", "favicon.ico"]
+)
 def test_only_the_pages_own_files_are_there(server, name):
     assert get(server, f"/{server.token}/{name}")[0] in (403, 404)
 
@@ -140,7 +146,9 @@ def test_a_websocket_without_the_token_is_refused(server):
 
     async def guess():
         url = f"ws://127.0.0.1:{server.port}/{token}/socket"
-        await websocket_connect(HTTPRequest(url, headers={"Origin": f"http://127.0.0.1:{server.port}"}))
+        await websocket_connect(
+            HTTPRequest(url, headers={"Origin": f"http://127.0.0.1:{server.port}"})
+        )
 
     with pytest.raises(HTTPClientError, match="403"):
         run(guess())
@@ -179,7 +187,9 @@ def test_a_slow_page_gets_the_latest_and_nothing_in_between(server):
             while not all(page.session.settled for page in server.pages):
                 assert time.monotonic() < deadline, "a page is owed a frame that it never gets"
                 await asyncio.sleep(0.01)
-            return [decode_header(content).sequence for content in received], decode_header(received[-1]).flags
+            return [decode_header(content).sequence for content in received], decode_header(
+                received[-1]
+            ).flags
 
     sequences, flags = run(slow())
     assert set(sequences) <= {1, before, before + published}
@@ -216,7 +226,9 @@ def strangers(server, count, text=b"GET /x"):
             one.close()
 
 
-@pytest.mark.parametrize("text", [slow_if(True, b""), b"GET /x", b"GET /wrong/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
+@pytest.mark.parametrize(
+    "text", [slow_if(True, b""), b"GET /x", b"GET /wrong/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"]
+)
 def test_strangers_do_not_keep_the_owner_out(server, text):
     """The oldest of them makes room, and a page that is open stays."""
 
@@ -273,7 +285,9 @@ def test_a_page_hears_a_sign_of_life(monkeypatch):
 
 
 def test_waiting_without_a_page_ends(server):
-    with pytest.raises(TimeoutError, match=r"no page is connected after 0.05 s; it is at http://127.0.0.1"):
+    with pytest.raises(
+        TimeoutError, match=r"no page is connected after 0.05 s; it is at http://127.0.0.1"
+    ):
         server.wait(0.05)
 
 

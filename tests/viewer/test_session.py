@@ -7,7 +7,10 @@ from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
 
 PANELS = [Slot.PANELS + k for k in range(20)]
 SLOTS = [*(slot for slot in Slot if slot < Slot.PANELS), *PANELS]
-offers = st.lists(st.one_of(st.sampled_from(SLOTS), st.sampled_from(["picture shown", "panel shown"])), max_size=40)
+offers = st.lists(
+    st.one_of(st.sampled_from(SLOTS), st.sampled_from(["picture shown", "panel shown"])),
+    max_size=40,
+)
 
 
 @given(offers, st.sets(st.sampled_from(SLOTS)))
@@ -49,7 +52,9 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
 
 
 def test_a_new_page_gets_the_scene_first():
-    session = Session({Slot.MOTION: (1, b"pose"), Slot.SCENE: (2, b"scene"), Slot.FRAMES: (3, b"frames")})
+    session = Session(
+        {Slot.MOTION: (1, b"pose"), Slot.SCENE: (2, b"scene"), Slot.FRAMES: (3, b"frames")}
+    )
     order = []
     while (message := session.next()) is not None:
         order.append(message)

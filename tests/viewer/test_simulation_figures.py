@@ -28,12 +28,17 @@ def curves(axes, color=None):
     return [line for line in lines if color is None or line.get_color() == color]
 
 
-@pytest.mark.parametrize("name", ["planar2r", "puma560", slow_if(True, "panda"), slow_if(True, "stanford")])
+@pytest.mark.parametrize(
+    "name", ["planar2r", "puma560", slow_if(True, "panda"), slow_if(True, "stanford")]
+)
 def test_curves_are_the_results(name):
     arm = library_robot(name)
     result = swinging(arm)
     axes = drawn(dhkit.plot(result))
-    kinds = {"angle [deg]": (~arm.numbers.prismatic, 180 / np.pi), "offset [m]": (arm.numbers.prismatic, 1.0)}
+    kinds = {
+        "angle [deg]": (~arm.numbers.prismatic, 180 / np.pi),
+        "offset [m]": (arm.numbers.prismatic, 1.0),
+    }
     for label, (chosen, unit) in kinds.items():
         joints = np.flatnonzero(chosen)
         assert (label in axes) == bool(len(joints))
@@ -50,7 +55,9 @@ def test_curves_are_the_results(name):
     for line, i in zip(curves(axes["torque / limit [%]"]), range(arm.n), strict=True):
         assert np.allclose(line.get_ydata(), 100 * result.tau[:, i] / arm.numbers.effort[i])
     assert np.allclose(curves(axes["position [mm]"])[0].get_ydata(), 1e3 * result.tool_error)
-    assert np.allclose(curves(axes["rotation [mrad]"])[0].get_ydata(), 1e3 * result.tool_rotation_error)
+    assert np.allclose(
+        curves(axes["rotation [mrad]"])[0].get_ydata(), 1e3 * result.tool_rotation_error
+    )
 
 
 @pytest.mark.slow
@@ -87,7 +94,8 @@ def test_torques_without_limits_are_in_newton_metres():
 
 
 @pytest.mark.parametrize(
-    ("error", "unit"), [(1e-10, "prad"), slow_if(True, 3e-5, "µrad"), slow_if(True, 0.3, "mrad"), (2.5, "rad")]
+    ("error", "unit"),
+    [(1e-10, "prad"), slow_if(True, 3e-5, "µrad"), slow_if(True, 0.3, "mrad"), (2.5, "rad")],
 )
 def test_errors_are_in_units_that_are_read_easily(error, unit):
     result = swinging(library_robot("planar2r"), error=error, seconds=5.0)
@@ -96,7 +104,10 @@ def test_errors_are_in_units_that_are_read_easily(error, unit):
 
 @pytest.mark.slow
 def test_a_run_without_error_and_one_of_a_single_state_have_figures():
-    for result in (swinging(library_robot("stanford"), error=0.0), swinging(library_robot("planar2r"), states=1)):
+    for result in (
+        swinging(library_robot("stanford"), error=0.0),
+        swinging(library_robot("planar2r"), states=1),
+    ):
         assert "joint error [rad]" in drawn(dhkit.plot(result))
         drawn(plot_comparison({"perfect": result}))
 
@@ -114,7 +125,10 @@ def test_a_long_run_is_drawn_by_few_points_that_keep_every_peak():
 @pytest.mark.slow
 def test_controllers_are_compared_by_their_largest_errors():
     arm = library_robot("puma560")
-    results = {f"law {k}": swinging(arm, error=10.0**-k, seed=k, seconds=2.0 - 0.1 * k) for k in range(1, 9)}
+    results = {
+        f"law {k}": swinging(arm, error=10.0**-k, seed=k, seconds=2.0 - 0.1 * k)
+        for k in range(1, 9)
+    }
     figure = plot_comparison(results)
     axes = drawn(figure)
     over_time = axes["largest joint error [rad]"]
@@ -135,17 +149,26 @@ def test_controllers_are_compared_by_their_largest_errors():
 
 
 def test_mixed_joints_are_named_by_both_units():
-    assert "largest joint error [rad, m]" in drawn(plot_comparison({"one": swinging(library_robot("stanford"))}))
+    assert "largest joint error [rad, m]" in drawn(
+        plot_comparison({"one": swinging(library_robot("stanford"))})
+    )
 
 
 def test_a_comparison_needs_results_of_the_same_joints():
     with pytest.raises(ValueError, match="results is empty; expected simulations by their names"):
         plot_comparison({})
     with pytest.raises(ValueError, match="two has joints RRRRRR; expected RR"):
-        plot_comparison({"one": swinging(library_robot("planar2r")), "two": swinging(library_robot("puma560"))})
+        plot_comparison(
+            {"one": swinging(library_robot("planar2r")), "two": swinging(library_robot("puma560"))}
+        )
 
 
 def test_joints_have_colours_and_line_styles_of_their_own():
-    assert len({(joint_color(i), joint_style(i)) for i in range(3 * len(CURVE_COLORS))}) == 3 * len(CURVE_COLORS)
+    assert len({(joint_color(i), joint_style(i)) for i in range(3 * len(CURVE_COLORS))}) == 3 * len(
+        CURVE_COLORS
+    )
     kinds = joint_kinds(library_robot("stanford"))
-    assert [(list(joints), factor) for joints, factor, *_ in kinds] == [([0, 1, 3, 4, 5], 180 / np.pi), ([2], 1.0)]
+    assert [(list(joints), factor) for joints, factor, *_ in kinds] == [
+        ([0, 1, 3, 4, 5], 180 / np.pi),
+        ([2], 1.0),
+    ]

@@ -21,7 +21,9 @@ def solid(axes):
     return [line for line in axes.lines if len(line.get_xdata()) > 2]
 
 
-@pytest.mark.parametrize("name", ["puma560", "planar2r", slow_if(True, "cobra600"), slow_if(True, "panda")])
+@pytest.mark.parametrize(
+    "name", ["puma560", "planar2r", slow_if(True, "cobra600"), slow_if(True, "panda")]
+)
 def test_curves_are_the_motions(name):
     arm = library_robot(name)
     lower, upper = np.maximum(arm.numbers.lower, -1), np.minimum(arm.numbers.upper, 1)
@@ -43,7 +45,8 @@ def test_curves_are_the_motions(name):
         places = np.flatnonzero(t == k)
         assert len(places) == 2
         assert np.allclose(
-            shares[0].get_ydata()[places[0]], 100 * motion.tau(k, side="left")[0] / arm.numbers.effort[0]
+            shares[0].get_ydata()[places[0]],
+            100 * motion.tau(k, side="left")[0] / arm.numbers.effort[0],
         )
     path = np.stack(figure.axes[-1].lines[-1].get_data_3d(), axis=1)
     assert np.allclose(path, world_to_tool(arm, motion.q(t))[:, :3, 3])
@@ -54,7 +57,9 @@ def test_near_limits_are_dashed_and_far_ones_left_out():
     motion = cubic(arm, [0, 0], [3.0, 0.1])
     angles = plot(motion).axes[0]
     dashed = [line for line in angles.lines if len(line.get_xdata()) == 2]
-    assert [line.get_ydata()[0] for line in dashed] == pytest.approx([np.degrees(arm.numbers.upper[0])])
+    assert [line.get_ydata()[0] for line in dashed] == pytest.approx(
+        [np.degrees(arm.numbers.upper[0])]
+    )
     assert dashed[0].get_color() == solid(angles)[0].get_color()
 
 
@@ -92,7 +97,9 @@ def test_motions_are_compared_over_the_same_time():
         t = rates[0].get_xdata()
         inside = ~np.isin(t, motion.breaks)
         for i in range(2):
-            assert np.allclose(rates[i].get_ydata(), 100 * motion.qd(t)[:, i] / arm.numbers.velocity[i])
+            assert np.allclose(
+                rates[i].get_ydata(), 100 * motion.qd(t)[:, i] / arm.numbers.velocity[i]
+            )
             expected = 100 * motion.tau(t)[:, i] / arm.numbers.effort[i]
             assert np.allclose(torques[i].get_ydata()[inside], expected[inside])
 
@@ -104,4 +111,6 @@ def test_a_comparison_needs_limits_and_one_robot():
     with pytest.raises(ValueError, match="has no speed limit"):
         plot_uses({"one": cubic(other, [0, 0], [1, 1], 1.0)})
     with pytest.raises(DescriptionError, match="the trajectory is one of"):
-        plot_uses({"one": cubic(arm, [0, 0], [1, 1], 1.0), "two": cubic(other, [0, 0], [1, 1], 1.0)})
+        plot_uses(
+            {"one": cubic(arm, [0, 0], [1, 1], 1.0), "two": cubic(other, [0, 0], [1, 1], 1.0)}
+        )

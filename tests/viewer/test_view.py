@@ -69,7 +69,9 @@ def test_a_simulation_plays_with_its_reference_as_a_ghost(name):
     assert np.array_equal(played.q, alone.q)
     assert np.array_equal(played.transforms, alone.transforms)
     assert alone.ghost is None
-    between = np.stack([np.interp(played.times, result.t, column) for column in result.reference_q.T], axis=1)
+    between = np.stack(
+        [np.interp(played.times, result.t, column) for column in result.reference_q.T], axis=1
+    )
     assert np.abs(played.ghost - node_transforms(arm, between)[:, :, :3]).max() < 2 * FLOAT32
     assert np.abs(played.ghost - played.transforms).max() > 0.05
 
@@ -81,9 +83,13 @@ def test_a_simulation_of_the_arm_with_a_payload_plays_and_one_of_another_arm_doe
         view.play(loaded)
         assert decode_animation(view._state[Slot.MOTION]).ghost is not None
         for other in ("planar2r", "ur5"):
-            with pytest.raises(DescriptionError, match=rf"simulation is one of {other} .*; expected one of puma560"):
+            with pytest.raises(
+                DescriptionError, match=rf"simulation is one of {other} .*; expected one of puma560"
+            ):
                 view.play(swinging(library_robot(other)))
-        with pytest.raises(ValueError, match=r"times has shape \(1,\); expected \(N,\) with N >= 2"):
+        with pytest.raises(
+            ValueError, match=r"times has shape \(1,\); expected \(N,\) with N >= 2"
+        ):
             view.play(swinging(arm, states=1))
 
 
@@ -111,7 +117,9 @@ def test_points_are_kept_with_their_colors_and_taken_away():
         assert np.abs(cloud.points - points).max() < FLOAT32
         assert np.abs(cloud.colors / 255 - colors).max() <= 0.5 / 255 + FLOAT32
         view.points(points, (1, 0, 0))
-        assert np.array_equal(decode_points(view._state[Slot.POINTS]).colors, np.tile([255, 0, 0], (50, 1)))
+        assert np.array_equal(
+            decode_points(view._state[Slot.POINTS]).colors, np.tile([255, 0, 0], (50, 1))
+        )
         view.points(None)
         assert len(decode_points(view._state[Slot.POINTS]).points) == 0
 
@@ -204,11 +212,17 @@ def test_obstacles_are_drawn_as_they_stand_and_taken_away():
             lambda v: v.points(np.zeros((4, 3)), np.zeros((3, 3))),
             r"colors has shape \(3, 3\); expected \(3,\) or \(4, 3\)",
         ),
-        (lambda v: v.points([[0, 0, 0]], [[0, 0, 255]]), "colors has values that are not from 0 to 1"),
+        (
+            lambda v: v.points([[0, 0, 0]], [[0, 0, 255]]),
+            "colors has values that are not from 0 to 1",
+        ),
         (lambda v: v.ghosts([0, 0]), r"q has shape \(2,\); expected \(k, 2\)"),
         (lambda v: v.ghosts([[0, 0]], (0, 0, -1)), "tints has values"),
         (lambda v: v.ellipsoid(force_ellipsoid(v.description, [0, 1])), "infinite in a direction"),
-        (lambda v: v.ellipsoid(velocity_ellipsoid(v.description, [0, 1]), scale=0), "scale is 0; expected a positive"),
+        (
+            lambda v: v.ellipsoid(velocity_ellipsoid(v.description, [0, 1]), scale=0),
+            "scale is 0; expected a positive",
+        ),
     ],
 )
 def test_wrong_arrays_are_named(call, complaint):
@@ -237,7 +251,12 @@ def test_a_closed_view_says_so_at_once():
     started = time.process_time()
     view.close()
     view.close()
-    for call in (lambda: view.show([0, 0]), lambda: view.url, lambda: view.wait(60), lambda: view.frames(True)):
+    for call in (
+        lambda: view.show([0, 0]),
+        lambda: view.url,
+        lambda: view.wait(60),
+        lambda: view.frames(True),
+    ):
         with pytest.raises(ModelError, match="closed"):
             call()
     assert time.process_time() - started < WITHIN

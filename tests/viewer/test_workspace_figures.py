@@ -66,7 +66,12 @@ def test_a_section_shows_distance_and_height():
 
 @pytest.mark.parametrize(
     ("rows", "kinds"),
-    [([(0, 0.5, 0, 0)], "R"), ([(0, 0, 0, 0)], "P"), ([(0, 0, 1, 0)], "R"), ([(0, 0, 0, 0)] * 2, "PR")],
+    [
+        ([(0, 0.5, 0, 0)], "R"),
+        ([(0, 0, 0, 0)], "P"),
+        ([(0, 0, 1, 0)], "R"),
+        ([(0, 0, 0, 0)] * 2, "PR"),
+    ],
 )
 def test_points_lines_and_circles_have_figures_too(rows, kinds):
     drawn(plot_workspace(workspace(from_dh(rows, kinds=kinds), 500)))
@@ -91,7 +96,8 @@ def test_ellipsoids_of_a_batch_are_drawn_together_without_the_missing_ones():
 
 
 @pytest.mark.parametrize(
-    ("q", "complaint"), [(np.zeros((2, 6)), r"expected \(6,\)"), (np.full(6, np.nan), "expected finite values")]
+    ("q", "complaint"),
+    [(np.zeros((2, 6)), r"expected \(6,\)"), (np.full(6, np.nan), "expected finite values")],
 )
 def test_wrong_states_are_named(q, complaint):
     with pytest.raises(ValueError, match=complaint):

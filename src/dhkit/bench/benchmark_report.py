@@ -194,7 +194,9 @@ class Requirement:
 
     def __repr__(self) -> str:
         what, required, measured, verdict = self.cells
-        return repr_line("Requirement", summary=", ".join(filter(None, (what, required, measured, verdict))))
+        return repr_line(
+            "Requirement", summary=", ".join(filter(None, (what, required, measured, verdict)))
+        )
 
 
 class Report:
@@ -258,7 +260,9 @@ class Report:
         requirements: Sequence[Requirement] = getattr(self, "requirements", ())
         cells = [requirement.cells for requirement in requirements]
         required = html_table(("what", "required", "measured", ""), cells) if cells else ""
-        return html_block(self.title, self.main_table, required, html_lines(list(self.machine.facts)))
+        return html_block(
+            self.title, self.main_table, required, html_lines(list(self.machine.facts))
+        )
 
 
 @dataclass(frozen=True)
@@ -318,15 +322,24 @@ class BenchReport(Report):
 
     def __repr__(self) -> str:
         return repr_line(
-            "BenchReport", self.robot, f"{counted(len(self.rows), 'row')}, {requirements_text(self.requirements)}"
+            "BenchReport",
+            self.robot,
+            f"{counted(len(self.rows), 'row')}, {requirements_text(self.requirements)}",
         )
 
     @property
     def main_table(self) -> str:
         """The fastest peer of each quantity, as HTML."""
         endings = {outcome.quantity: outcome.ending.value for outcome in self.outcomes}
-        rows = [(quantity, *self._fastest(quantity), endings.get(quantity, "")) for quantity in self.quantities]
-        return html_table(("quantity", "dhkit, an item", "the fastest peer", "an item", "ended"), rows, align="lrlrl")
+        rows = [
+            (quantity, *self._fastest(quantity), endings.get(quantity, ""))
+            for quantity in self.quantities
+        ]
+        return html_table(
+            ("quantity", "dhkit, an item", "the fastest peer", "an item", "ended"),
+            rows,
+            align="lrlrl",
+        )
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -337,9 +350,17 @@ class BenchReport(Report):
         """Return dhkit's shortest time, and the fastest of the peers that agree with its time, as text."""
         rows = [row for row in self.rows if row.quantity == quantity]
         own = min((row.seconds for row in rows if row.own), default=None)
-        peer = min((row for row in rows if not row.own and row.verdict.ok), key=lambda row: row.seconds, default=None)
+        peer = min(
+            (row for row in rows if not row.own and row.verdict.ok),
+            key=lambda row: row.seconds,
+            default=None,
+        )
         own_text = "–" if own is None else duration(own)
-        return (own_text, "–", "–") if peer is None else (own_text, peer.contender, duration(peer.seconds))
+        return (
+            (own_text, "–", "–")
+            if peer is None
+            else (own_text, peer.contender, duration(peer.seconds))
+        )
 
     @property
     def title(self) -> str:
@@ -351,7 +372,17 @@ class BenchReport(Report):
     @property
     def tables(self) -> list[Table]:
         """Timings by quantity, requirements, and results of the probes."""
-        columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
+        columns = (
+            "contender",
+            "called",
+            "items",
+            "time",
+            "quartiles",
+            "x batch",
+            "x single",
+            "solutions",
+            "error",
+        )
         tables: list[Table] = []
         for quantity in self.quantities:
             timings = [_cells(row) for row in self.rows if row.quantity == quantity]

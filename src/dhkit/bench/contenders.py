@@ -153,7 +153,9 @@ def import_peer(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
-        raise UnavailableError(f"not installed: no module named {error.name}; {from_checkout('bench')}") from None
+        raise UnavailableError(
+            f"not installed: no module named {error.name}; {from_checkout('bench')}"
+        ) from None
     except ImportError as error:
         raise UnavailableError(f"cannot be imported: {error}") from None
 
@@ -186,7 +188,9 @@ def one_by_one(function: Callable[..., object], inputs: Sequence[Any]) -> Callab
 
 
 def single_task(
-    function: Callable[..., Any], inputs: Iterable[Any], answer: Callable[[Any], Array] = lambda result: result
+    function: Callable[..., Any],
+    inputs: Iterable[Any],
+    answer: Callable[[Any], Array] = lambda result: result,
 ) -> Task:
     """Return the task of calling a function for one input after the other; ``answer`` converts its results."""
     inputs = list(inputs)

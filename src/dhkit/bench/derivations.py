@@ -27,7 +27,14 @@ _EXACT = "dhkit, exact M, C, g, tau in numbers"
 _INERTIAL = "dhkit, exact, all inertial parameters symbols"
 PROOFS = "dhkit, both proofs of that"
 INVERSE_DYNAMICS = "inverse dynamics"
-FUNCTIONS = ("mass_matrix", "coriolis_matrix", "gravity_torque", "inverse_dynamics", "forward_dynamics", "lagrange")
+FUNCTIONS = (
+    "mass_matrix",
+    "coriolis_matrix",
+    "gravity_torque",
+    "inverse_dynamics",
+    "forward_dynamics",
+    "lagrange",
+)
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,9 @@ class Derivation:
     @property
     def cells(self) -> tuple[str, ...]:
         """The cells of a row under :attr:`COLUMNS`."""
-        time = f"{self.seconds:.3g} s" if self.seconds is not None else f"not within {self.limit:g} s"
+        time = (
+            f"{self.seconds:.3g} s" if self.seconds is not None else f"not within {self.limit:g} s"
+        )
         return self.robot, self.what, time
 
     __repr__ = value_line
@@ -85,7 +94,12 @@ def operations(arm: Arm) -> list[Operations]:
         counts = operation_count(dynamics_graph(quantity, arm.description))
         additions = counts.get("additions", 0) + counts.get("negations", 0)
         counted.append(
-            Operations(name, additions, counts.get("multiplications", 0), counts.get("sines and cosines", 0))
+            Operations(
+                name,
+                additions,
+                counts.get("multiplications", 0),
+                counts.get("sines and cosines", 0),
+            )
         )
     return counted
 
@@ -109,14 +123,25 @@ def derivations(arm: Arm, limit: float) -> list[Derivation]:
 
     def proofs() -> None:
         lag = lagrangian(description, "inertial")
-        if not (lag.prove_euler_lagrange(derive(description, symbols="inertial")) and lag.prove_skew_symmetry()):
+        if not (
+            lag.prove_euler_lagrange(derive(description, symbols="inertial"))
+            and lag.prove_skew_symmetry()
+        ):
             raise DhkitError("the two derivations differ")
 
-    own = ((CASADI, casadi), (_EXACT, exact("none")), (_INERTIAL, exact("inertial")), (PROOFS, proofs))
+    own = (
+        (CASADI, casadi),
+        (_EXACT, exact("none")),
+        (_INERTIAL, exact("inertial")),
+        (PROOFS, proofs),
+    )
     timed = [Derivation(arm.name, what, _seconds(run), limit) for what, run in own]
     peers = [Arm.load(name) for name in ("planar2r", "planar3r")]
     peers += [] if arm.name in ("planar2r", "planar3r") else [arm]
-    return [*timed, *(Derivation(peer.name, PEER, _peer_seconds(peer, limit), limit) for peer in peers)]
+    return [
+        *timed,
+        *(Derivation(peer.name, PEER, _peer_seconds(peer, limit), limit) for peer in peers),
+    ]
 
 
 def _seconds(run: Callable[[], None]) -> float:
@@ -131,7 +156,12 @@ def _peer_seconds(arm: Arm, limit: float) -> float | None:
     with tempfile.TemporaryDirectory() as folder:
         robot = Path(folder) / "robot.toml"
         write_robot(bare(arm.description), robot)
-        command = [sys.executable, "-c", "from dhkit.bench import derivations as d; d.report_peer()", str(robot)]
+        command = [
+            sys.executable,
+            "-c",
+            "from dhkit.bench import derivations as d; d.report_peer()",
+            str(robot),
+        ]
         try:
             process = subprocess.run(  # noqa: S603 - our own code
                 command, capture_output=True, text=True, timeout=limit + 10, check=True

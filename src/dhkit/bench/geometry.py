@@ -92,7 +92,9 @@ def _wrist_centre(axes: JointAxes) -> Array | None:
     points = axes.points[-3:]
     # Least squares of the distances to the three lines: sum (1 - h h^T) (x - p) = 0.
     projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    centre = np.linalg.lstsq(projectors.sum(axis=0), np.einsum("kij,kj->i", projectors, points), rcond=None)[0]
+    centre = np.linalg.lstsq(
+        projectors.sum(axis=0), np.einsum("kij,kj->i", projectors, points), rcond=None
+    )[0]
     distances = np.linalg.norm(np.einsum("kij,kj->ki", projectors, centre - points), axis=1)
     return centre if distances.max() < _AXIS_TOLERANCE else None
 
@@ -142,8 +144,14 @@ class OrthoParallel:
         centre = _wrist_centre(axes)
         h = axes.directions
         cosines = [abs(h[i] @ h[i + 1]) for i in (0, 2, 3, 4)]
-        if centre is None or max(cosines) > _AXIS_TOLERANCE or np.linalg.norm(np.cross(h[1], h[2])) > _AXIS_TOLERANCE:
-            raise UnavailableError("takes an ortho-parallel basis with a spherical wrist; this arm is built otherwise")
+        if (
+            centre is None
+            or max(cosines) > _AXIS_TOLERANCE
+            or np.linalg.norm(np.cross(h[1], h[2])) > _AXIS_TOLERANCE
+        ):
+            raise UnavailableError(
+                "takes an ortho-parallel basis with a spherical wrist; this arm is built otherwise"
+            )
         return _fit_upright(description)
 
     def poses(self, T: Array) -> Array:
@@ -174,7 +182,9 @@ def _fit_upright(description: Description) -> OrthoParallel:
         """Turn a joint until one vector has the direction of another, seen along the joint's axis z."""
         # Signed angle about z from c to t:  tan = z . (c x t) / (c . t - (z . c)(z . t)).
         axis = joint_axes(description, q).directions[joint]
-        q[joint] = np.arctan2(axis @ np.cross(current, target), current @ target - (axis @ current) * (axis @ target))
+        q[joint] = np.arctan2(
+            axis @ np.cross(current, target), current @ target - (axis @ current) * (axis @ target)
+        )
         return joint_axes(description, q)
 
     upper_arm = axes.points[2] - axes.points[1]

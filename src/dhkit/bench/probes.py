@@ -80,7 +80,13 @@ class PeakMemory:
     """
 
     CALLED: ClassVar[tuple[str, ...]] = ("out=", "new arrays")
-    COLUMNS: ClassVar[tuple[str, ...]] = ("quantity", "called with", "inputs and outputs [MB]", "peak [MB]", "share")
+    COLUMNS: ClassVar[tuple[str, ...]] = (
+        "quantity",
+        "called with",
+        "inputs and outputs [MB]",
+        "peak [MB]",
+        "share",
+    )
     quantity: str
     called: str
     inputs: int
@@ -192,7 +198,13 @@ def peak_memory(workload: Workload, quantity: str, called: str) -> PeakMemory:
     with tempfile.TemporaryDirectory() as folder:
         robot = _robot_file(workload.arm, folder)
         printed = _python(
-            code, robot, quantity, called, str(len(workload.q)), str(workload.threads), environment=malloc
+            code,
+            robot,
+            quantity,
+            called,
+            str(len(workload.q)),
+            str(workload.threads),
+            environment=malloc,
         )
     return PeakMemory(quantity, called, **json.loads(printed))
 
@@ -243,7 +255,11 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
         A process fails, or there is no such method.
     """
     method(workload.arm, quantity)
-    arguments = {"ik": "arm.fk(q)", "inverse_dynamics": "q, q, q", "forward_dynamics": "q, q, q"}.get(quantity, "q")
+    arguments = {
+        "ik": "arm.fk(q)",
+        "inverse_dynamics": "q, q, q",
+        "forward_dynamics": "q, q, q",
+    }.get(quantity, "q")
     code = (
         "import sys, numpy as np, dhkit; arm = dhkit.Arm.load(sys.argv[1]); "
         f"q = np.random.default_rng(0).uniform(-1, 1, (int(sys.argv[2]), arm.n)); arm.{quantity}({arguments})"

@@ -10,12 +10,27 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.bench.agreement import Verdict, judge
-from dhkit.bench.benchmark_report import BATCH, BenchReport, Ending, Missing, Outcome, Requirement, Row
+from dhkit.bench.benchmark_report import (
+    BATCH,
+    BenchReport,
+    Ending,
+    Missing,
+    Outcome,
+    Requirement,
+    Row,
+)
 from dhkit.bench.contenders import QUANTITIES, Call, Contender, UnavailableError, Workload
 from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders, dhkit_arm
-from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
+from dhkit.bench.probes import (
+    FirstCall,
+    PeakMemory,
+    ThreadScaling,
+    first_call,
+    peak_memory,
+    thread_scaling,
+)
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
@@ -121,8 +136,16 @@ def run(
             tell("compiling")
             arm.compile()
             for quantity in quantities:
-                _compare(workload, [c for c in chosen if c.quantity == quantity], repeats, measurements, tell)
-                measurements.outcomes.append(outcome_of(quantity, measurements.rows, measurements.missing))
+                _compare(
+                    workload,
+                    [c for c in chosen if c.quantity == quantity],
+                    repeats,
+                    measurements,
+                    tell,
+                )
+                measurements.outcomes.append(
+                    outcome_of(quantity, measurements.rows, measurements.missing)
+                )
             for quantity in quantities if probes else ():
                 _probe(workload, quantity, repeats, measurements, tell)
             if probes and not _DYNAMICS.isdisjoint(quantities):
@@ -165,15 +188,23 @@ def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -
     rows = [row for row in rows if row.quantity == quantity]
     absent = [one for one in missing if one.quantity == quantity]
     raised = [(one.own, f"{one.name}: {one.reason}") for one in absent if one.failed]
-    disagreeing = [(row.own, f"{row.contender}: {row.verdict}") for row in rows if not row.verdict.ok]
+    disagreeing = [
+        (row.own, f"{row.contender}: {row.verdict}") for row in rows if not row.verdict.ok
+    ]
     own_failed = tuple(cause for own, cause in (*raised, *disagreeing) if own)
     peers_failed = tuple(cause for own, cause in (*raised, *disagreeing) if not own)
-    own_unavailable = tuple(f"{one.name}: {one.reason}" for one in absent if one.own and not one.failed)
+    own_unavailable = tuple(
+        f"{one.name}: {one.reason}" for one in absent if one.own and not one.failed
+    )
 
     if not any(row.verdict.ok for row in rows):
         if own_failed or peers_failed:
-            return Outcome(quantity, Ending.ALL_FAILED, (*own_unavailable, *own_failed, *peers_failed))
-        return Outcome(quantity, Ending.NOTHING_TIMED, tuple(f"{one.name}: {one.reason}" for one in absent))
+            return Outcome(
+                quantity, Ending.ALL_FAILED, (*own_unavailable, *own_failed, *peers_failed)
+            )
+        return Outcome(
+            quantity, Ending.NOTHING_TIMED, tuple(f"{one.name}: {one.reason}" for one in absent)
+        )
     if own_failed:
         return Outcome(quantity, Ending.OWN_FAILED, own_failed)
     if own_unavailable and not any(row.own for row in rows):
@@ -191,7 +222,11 @@ def _check_arguments(quantities: Sequence[str], **counts: int) -> None:
 
 
 def _compare(
-    workload: Workload, contenders: Sequence[Contender], repeats: int, measurements: _Measurements, tell: Progress
+    workload: Workload,
+    contenders: Sequence[Contender],
+    repeats: int,
+    measurements: _Measurements,
+    tell: Progress,
 ) -> None:
     """Check and time the contenders of one quantity; the rounds of an interrupted run are kept."""
     entrants = list(_entrants(workload, contenders, measurements, tell))
@@ -221,7 +256,9 @@ def _entrants(
             repetitions = lasting(call)
             entrant = _Entrant(contender, verdict, items, repetitions, repeated(call, repetitions))
         except Exception as error:  # a peer may fail in any way; the report names it
-            measurements.missing.append(_missing(contender.quantity, contender.name, error, own=contender.own))
+            measurements.missing.append(
+                _missing(contender.quantity, contender.name, error, own=contender.own)
+            )
         else:
             yield entrant
 
@@ -244,7 +281,11 @@ def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
     names = [entrant.contender.name for entrant in entrants]
 
     def ratio(k: int, reference: str) -> float | None:
-        return float(np.median(per_item[:, k] / per_item[:, names.index(reference)])) if reference in names else None
+        return (
+            float(np.median(per_item[:, k] / per_item[:, names.index(reference)]))
+            if reference in names
+            else None
+        )
 
     return [
         Row(
@@ -274,10 +315,14 @@ def _derive(arm: Arm, measurements: _Measurements) -> None:
         measurements.missing.append(_missing("dynamics", "derivations", error))
 
 
-def _probe(workload: Workload, quantity: str, repeats: int, measurements: _Measurements, tell: Progress) -> None:
+def _probe(
+    workload: Workload, quantity: str, repeats: int, measurements: _Measurements, tell: Progress
+) -> None:
     """Measure the probes of a quantity; a probe that cannot be measured is listed as missing."""
 
-    def probe(name: str, results: list[Any], measure: Callable[..., object], *options: object) -> None:
+    def probe(
+        name: str, results: list[Any], measure: Callable[..., object], *options: object
+    ) -> None:
         tell(f"{quantity}: {name}")
         try:
             results.append(measure(workload, quantity, *options))

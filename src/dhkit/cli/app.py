@@ -70,9 +70,13 @@ class LazyCommand(TyperCommand):
 
     def get_short_help_str(self, limit: int = 0) -> str:
         """Return the first paragraph of the command's docstring, of whatever length, without importing its module."""
-        tree = ast.parse((Path(__file__).parent / f"{COMMANDS[str(self.name)]}.py").read_text("utf-8"))
+        tree = ast.parse(
+            (Path(__file__).parent / f"{COMMANDS[str(self.name)]}.py").read_text("utf-8")
+        )
         name = str(self.name).replace("-", "_")
-        function = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name)
+        function = next(
+            node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name
+        )
         return " ".join((ast.get_docstring(function) or "").split("\n\n")[0].split())
 
 
@@ -96,7 +100,9 @@ class Commands(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the list into the help."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, command.get_short_help_str()) for name, command in self.commands.items()])
+            formatter.write_dl(
+                [(name, command.get_short_help_str()) for name, command in self.commands.items()]
+            )
 
 
 app = typer.Typer(
@@ -120,7 +126,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     clean_streams()
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
-    logging.getLogger("dhkit").setLevel(logging.INFO)  # messages about work that takes seconds, such as compiling
+    logging.getLogger("dhkit").setLevel(
+        logging.INFO
+    )  # messages about work that takes seconds, such as compiling
     degrees = DEGREES.set(False)
     as_designed = AS_DESIGNED.set(False)
     try:
@@ -150,7 +158,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _refuse(message: str) -> ExitStatus:
     """Print one line on stderr, shortened, and return the status of unusable input."""
     line = LONG_WORD.sub(lambda match: f"{match[0][:MAX_WORD_LENGTH]}…", " ".join(message.split()))
-    sys.stderr.write(f"dhkit: {line if len(line) <= MAX_MESSAGE_LENGTH else f'{line[:MAX_MESSAGE_LENGTH]}…'}\n")
+    sys.stderr.write(
+        f"dhkit: {line if len(line) <= MAX_MESSAGE_LENGTH else f'{line[:MAX_MESSAGE_LENGTH]}…'}\n"
+    )
     return ExitStatus.UNUSABLE
 
 
@@ -160,7 +170,10 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
-Version = Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")]
+Version = Annotated[
+    bool,
+    typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
+]
 
 
 @app.callback()

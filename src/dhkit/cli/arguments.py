@@ -61,7 +61,9 @@ def numbers(words: Sequence[str], what: str, counts: Sequence[int]) -> Array:
     """
     expressions = _split(words)
     if len(expressions) not in counts:
-        raise DescriptionError(f"{what}: {len(expressions)} values; expected {' or '.join(map(str, counts))}")
+        raise DescriptionError(
+            f"{what}: {len(expressions)} values; expected {' or '.join(map(str, counts))}"
+        )
     try:
         return np.array([float(parse(word)) for word in expressions])
     except ExpressionError as error:
@@ -101,22 +103,38 @@ def joint_values(
     if len(words) == 1 and words[0] in arm.configurations:
         return _with_warning(arm, arm.configurations[words[0]], words[0], outside)
     expressions = _split(words)
-    if len(expressions) == 1 and not expressions[0][:1].isdigit() and expressions[0][:1] not in "+-.(":
+    if (
+        len(expressions) == 1
+        and not expressions[0][:1].isdigit()
+        and expressions[0][:1] not in "+-.("
+    ):
         names = ", ".join(arm.configurations)
-        raise DescriptionError(f"{arm.name} has no configuration {expressions[0]!r}; it has {names or 'none'}")
+        raise DescriptionError(
+            f"{arm.name} has no configuration {expressions[0]!r}; it has {names or 'none'}"
+        )
     if option := next((word for word in expressions if word.startswith("--")), None):
         raise DescriptionError(f"no such option: {option}")
     if len(expressions) != arm.n:
         raise DescriptionError(f"{len(expressions)} {what}; expected {arm.n} for {arm.name}")
     if degrees and (found := next((word for word in expressions if ANGLE_UNIT.search(word)), None)):
-        raise DescriptionError(f"{what}: found {found[:40]!r}; expected bare numbers, which are degrees with --degrees")
+        raise DescriptionError(
+            f"{what}: found {found[:40]!r}; expected bare numbers, which are degrees with --degrees"
+        )
     values = numbers(expressions, what, [arm.n])
-    values = np.where(arm.description.numbers.prismatic, values, np.radians(values)) if degrees else values
+    values = (
+        np.where(arm.description.numbers.prismatic, values, np.radians(values))
+        if degrees
+        else values
+    )
     return _with_warning(arm, values, what, outside)
 
 
 def option_values(
-    arm: Arm, text: str, option: str, degrees: bool, outside: OutsideLimits = OutsideLimits.REFUSED_LATER
+    arm: Arm,
+    text: str,
+    option: str,
+    degrees: bool,
+    outside: OutsideLimits = OutsideLimits.REFUSED_LATER,
 ) -> Array:
     """Return the joint values of an option, shape (n,), rad and m: see :func:`joint_values`."""
     return joint_values(arm, [text], degrees, f"values of {option}", outside=outside)
@@ -139,7 +157,14 @@ def _with_warning(arm: Arm, q: Array, what: str, outside: OutsideLimits) -> Arra
 
 
 def target(
-    arm: Arm, *, xyz: str | None, euler: str, order: str, matrix: str | None, like: str | None, degrees: bool
+    arm: Arm,
+    *,
+    xyz: str | None,
+    euler: str,
+    order: str,
+    matrix: str | None,
+    like: str | None,
+    degrees: bool,
 ) -> Array:
     """Return the pose of --xyz and --euler, of --matrix, or of the joint values of --like, shape (4, 4), m, world.
 
@@ -155,7 +180,9 @@ def target(
         raise DescriptionError("no single pose; expected one of --xyz, --matrix and --like")
     angles = numbers([euler], "--euler", [3])
     if found := next((x for x in angles if degrees_hint(x, slides=False)), None):
-        sys.stderr.write(f"dhkit: warning: --euler: found {found:g} rad{degrees_hint(found, slides=False)}\n")
+        sys.stderr.write(
+            f"dhkit: warning: --euler: found {found:g} rad{degrees_hint(found, slides=False)}\n"
+        )
     T = pose(euler=angles, order=order, degrees=degrees)
     if matrix is not None:
         return _matrix(matrix)
@@ -189,7 +216,9 @@ def objective(text: str) -> Objective:
             )
         factor = float(numbers(words[:-1], "--objective", [1])[0]) if words[1:] else 1.0
         if factor <= 0:
-            raise DescriptionError(f"--objective: found {term.strip()!r}; expected a positive factor")
+            raise DescriptionError(
+                f"--objective: found {term.strip()!r}; expected a positive factor"
+            )
         terms.append(factor * OBJECTIVES[words[-1]])
     return Objective(tuple(terms))
 
@@ -221,7 +250,9 @@ def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed
             continue
         values = np.broadcast_to(numbers([text], f"--{name}", sorted({1, arm.n})), arm.n)
         is_angle = degrees and name != "torque"
-        limits[name] = np.where(arm.description.numbers.prismatic | (not is_angle), values, np.radians(values))
+        limits[name] = np.where(
+            arm.description.numbers.prismatic | (not is_angle), values, np.radians(values)
+        )
     return Limits.of(arm.description, **limits).scaled(velocity=speed)
 
 
@@ -237,7 +268,9 @@ def columns(text: str | None) -> dict[str, str] | None:
         return None
     pairs = [word.partition("=") for word in text.replace(",", " ").split()]
     if not pairs or not all(ours and theirs for ours, _, theirs in pairs):
-        raise DescriptionError(f'--columns: found {text!r}; expected OURS=THEIRS ..., such as "t=tout q=yout"')
+        raise DescriptionError(
+            f'--columns: found {text!r}; expected OURS=THEIRS ..., such as "t=tout q=yout"'
+        )
     return {ours: theirs for ours, _, theirs in pairs}
 
 
@@ -258,7 +291,9 @@ def payload(text: str | None) -> Payload | None:
     return Payload(float(numbers([mass], "--payload", [1])[0]), (float(x), float(y), float(z)))
 
 
-def obstacles(boxes: Sequence[str], spheres: Sequence[str], floor: str | None) -> list[Obstacle | Floor]:
+def obstacles(
+    boxes: Sequence[str], spheres: Sequence[str], floor: str | None
+) -> list[Obstacle | Floor]:
     """Return obstacles: boxes "SX SY SZ @ X Y Z", balls "R @ X Y Z" and the height of a floor, m.
 
     Raises
@@ -320,7 +355,9 @@ def with_long_options(counts: Mapping[str, int | None]) -> type[TyperCommand]:
     return LongOptionCommand
 
 
-def _join_option_words(args: Sequence[str], counts: Mapping[str, int | None], short: Collection[str]) -> list[str]:
+def _join_option_words(
+    args: Sequence[str], counts: Mapping[str, int | None], short: Collection[str]
+) -> list[str]:
     """Return arguments with the words after each of these options joined into one."""
     joined = []
     rest = list(args)
@@ -338,7 +375,9 @@ def _join_option_words(args: Sequence[str], counts: Mapping[str, int | None], sh
         ):
             values.append(rest.pop(0))
         if not values:
-            raise DescriptionError(f"{word}: no values; expected {'some' if count is None else count} after it")
+            raise DescriptionError(
+                f"{word}: no values; expected {'some' if count is None else count} after it"
+            )
         joined.append(" ".join(values))
     return joined
 
@@ -353,14 +392,20 @@ def _matrix(given: str) -> Array:
     if len(words) == 1:
         words = _split([_file_text(Path(given))])
     entries = numbers(words, "--matrix", [16, 12])
-    return check_pose(np.append(entries[:12], entries[12:] if len(entries) == 16 else (0, 0, 0, 1)).reshape(4, 4))
+    return check_pose(
+        np.append(entries[:12], entries[12:] if len(entries) == 16 else (0, 0, 0, 1)).reshape(4, 4)
+    )
 
 
 def _file_text(path: Path) -> str:
     if not path.is_file():
-        raise DescriptionError(f"--matrix: found {str(path)!r}; expected 16 or 12 numbers, or a text file of them")
+        raise DescriptionError(
+            f"--matrix: found {str(path)!r}; expected 16 or 12 numbers, or a text file of them"
+        )
     if path.stat().st_size > MAX_MATRIX_BYTES:
-        raise DescriptionError(f"{path}: more than {MAX_MATRIX_BYTES} bytes; expected 16 or 12 numbers")
+        raise DescriptionError(
+            f"{path}: more than {MAX_MATRIX_BYTES} bytes; expected 16 or 12 numbers"
+        )
     try:
         return path.read_text("utf-8")
     except UnicodeDecodeError:

@@ -28,15 +28,26 @@ _ERASE_LINE = "\r\x1b[K"
 
 @app.command()
 def bench(
-    quantities: Annotated[list[str] | None, typer.Argument(help="Quantities to time; default: all.")] = None,
+    quantities: Annotated[
+        list[str] | None, typer.Argument(help="Quantities to time; default: all.")
+    ] = None,
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
-    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Configurations or poses in a batch.")] = 100_000,
-    threads: Annotated[int, typer.Option(min=1, max=1024, help="Number of threads that batch calls may use.")] = 1,
-    repeats: Annotated[int, typer.Option(min=1, max=1000, help="Number of interleaved rounds.")] = 9,
+    batch: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="Configurations or poses in a batch.")
+    ] = 100_000,
+    threads: Annotated[
+        int, typer.Option(min=1, max=1024, help="Number of threads that batch calls may use.")
+    ] = 1,
+    repeats: Annotated[
+        int, typer.Option(min=1, max=1000, help="Number of interleaved rounds.")
+    ] = 9,
     seed: Seed = 0,
-    probes: Annotated[bool, typer.Option(help="Measure thread scaling, memory and first calls too.")] = True,
+    probes: Annotated[
+        bool, typer.Option(help="Measure thread scaling, memory and first calls too.")
+    ] = True,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="NAME", help="Write NAME.md and NAME.json as well.")
+        Path | None,
+        typer.Option("--output", "-o", metavar="NAME", help="Write NAME.md and NAME.json as well."),
     ] = None,
     json: Json = False,
 ) -> ExitStatus:
@@ -113,7 +124,9 @@ def write(report: Report, path: Path) -> tuple[Path, Path]:
     """Write a report as Markdown and as JSON, whatever the path's suffix; return the two files."""
     markdown, json = _files(path)
     write_atomically(markdown, report.markdown())
-    write_atomically(json, json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    write_atomically(
+        json, json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+    )
     return markdown, json
 
 

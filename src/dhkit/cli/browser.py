@@ -37,30 +37,53 @@ def until_interrupted(url: str, what: str, *, open_browser: bool) -> ExitStatus:
 
 @app.command()
 def lab(
-    robot: Annotated[str, typer.Argument(help="A library name, a robot file or an assignment (.toml).")],
+    robot: Annotated[
+        str, typer.Argument(help="A library name, a robot file or an assignment (.toml).")
+    ],
     port: Annotated[
         int | None,
-        typer.Option(min=1024, max=65535, help="Port of the page; the address, token included, stays the same."),
+        typer.Option(
+            min=1024,
+            max=65535,
+            help="Port of the page; the address, token included, stays the same.",
+        ),
     ] = None,
-    mine: Annotated[Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")] = None,
-    run: Annotated[str | None, typer.Option(help="Your program instead of a file; ARGUMENTS follow the robot.")] = None,
-    arguments: Annotated[list[str] | None, typer.Argument(help="Arguments of the program of --run.")] = None,
+    mine: Annotated[
+        Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")
+    ] = None,
+    run: Annotated[
+        str | None, typer.Option(help="Your program instead of a file; ARGUMENTS follow the robot.")
+    ] = None,
+    arguments: Annotated[
+        list[str] | None, typer.Argument(help="Arguments of the program of --run.")
+    ] = None,
     isolated: Isolated = False,
-    solid: Annotated[Path | None, typer.Option(help="STL file for the panel of transforms.")] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Folder in which the work on an assignment is recorded, to be handed in.")
+    solid: Annotated[
+        Path | None, typer.Option(help="STL file for the panel of transforms.")
     ] = None,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder in which the work on an assignment is recorded, to be handed in."
+        ),
+    ] = None,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Print the address, and open no browser.")
+    ] = False,
 ) -> ExitStatus:
     """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
     if mine is not None and run is not None:
         raise DescriptionError("--mine and --run; expected one of them")
     if arguments and run is None:
-        raise DescriptionError(f"{arguments[0]!r} after the robot; expected --run PROGRAM for arguments")
+        raise DescriptionError(
+            f"{arguments[0]!r} after the robot; expected --run PROGRAM for arguments"
+        )
     own = mine if run is None else [run, *(arguments or [])]
     assignment = Assignment.read(robot) if is_assignment(robot) else None
     if record is not None and assignment is None:
-        raise DescriptionError(f'--record: {robot} is not an assignment; expected a file with kind = "assignment"')
+        raise DescriptionError(
+            f'--record: {robot} is not an assignment; expected a file with kind = "assignment"'
+        )
     arm = load_arm(robot) if assignment is None else assignment.arm
     what = f"the lab of {arm.name}" if assignment is None else f"{assignment.title}: the lab"
     found = None
@@ -85,8 +108,12 @@ def lab(
 @app.command()
 def view(
     robot: Robot,
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
-    html: Annotated[Path | None, typer.Option(help="Write a page instead of opening the browser.")] = None,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Print the address, and open no browser.")
+    ] = False,
+    html: Annotated[
+        Path | None, typer.Option(help="Write a page instead of opening the browser.")
+    ] = None,
 ) -> ExitStatus:
     """Show an arm in the browser, to look at; Ctrl-C ends it."""
     arm = load_arm(robot)

@@ -60,7 +60,9 @@ class InverseKinematics:
 @app.command()
 def demo(
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Use fewer samples.")] = False,
     json: Json = False,
 ) -> ExitStatus:
@@ -118,7 +120,9 @@ def _verify(arm: Arm, samples: int, reports: list[VerificationReport]) -> str:
     reports.append(report)
     worst = max(report.agreements, key=lambda agreement: agreement.error / agreement.tolerance)
     verdict = "agrees with" if report.ok else "DISAGREES with"
-    return f"{verdict} {report.reference} in {samples} states: {worst.quantity} to {worst.error:.1e}"
+    return (
+        f"{verdict} {report.reference} in {samples} states: {worst.quantity} to {worst.error:.1e}"
+    )
 
 
 def _equations(arm: Arm, folder: Path) -> str:
@@ -150,7 +154,11 @@ def _figure(arm: Arm, path: Path) -> str:
 
     configurations = arm.configurations
     shown = next((name for name in ("nominal", "ready", "zero") if name in configurations), None)
-    return str(write_figure(plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)), path))
+    return str(
+        write_figure(
+            plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)), path
+        )
+    )
 
 
 def _inverse(arm: Arm, folder: Path, shown: list[InverseKinematics]) -> str:
@@ -239,11 +247,15 @@ def _control(arm: Arm, folder: Path, motions: dict[str, Motion]) -> str:
         "The simulated arm under two controllers; the grey arm beside it is the motion that was asked for. A PID of "
         "each joint does not know the arm's dynamics, computed torque does.\n"
         + "; ".join(
-            f"{name}: the tool errs by {1000 * r.tool_norms.peak:.2g} mm" for name, r in compared.results.items()
+            f"{name}: the tool errs by {1000 * r.tool_norms.peak:.2g} mm"
+            for name, r in compared.results.items()
         )
         + f'. "{next(iter(simulated))}" plays first.',
     )
-    errors = [f"{name} errs by {1000 * run.tool_norms.peak:.2g} mm" for name, run in compared.results.items()]
+    errors = [
+        f"{name} errs by {1000 * run.tool_norms.peak:.2g} mm"
+        for name, run in compared.results.items()
+    ]
     seconds = f"{motion.duration:.3g} s at 1 kHz"
     return f"{seconds}: {', '.join(errors)}; {folder / 'control.html'}: pid, with the motion asked for as a ghost"
 
@@ -258,19 +270,25 @@ def _page(arm: Arm, inverse: InverseKinematics, path: Path, motions: dict[str, M
     """Write a page with the arm's motions and, at the pose where the first begins, its other branches as ghosts."""
     line = inverse.line
     times, q = tour(arm, None if line is None else line.q)
-    first = "tour of the configurations" if line is None else "tour, with a straight line of the tool"
+    first = (
+        "tour of the configurations" if line is None else "tour, with a straight line of the tool"
+    )
     is_ghost = _looks_different(arm, inverse.branches.q, q[0])
     lines = [arm.description.source, f'The motion "{first}" plays first; more are under Motions.']
     if is_ghost.any():
         lines.append("Translucent arms are the other ways to reach the pose with which it begins.")
     with arm.view() as view:
         view.show(q[0])
-        names = [name for name, ghost in zip(inverse.branches.names, is_ghost, strict=True) if ghost]
+        names = [
+            name for name, ghost in zip(inverse.branches.names, is_ghost, strict=True) if ghost
+        ]
         view.ghosts(inverse.branches.q[is_ghost], names=names)
         view.trace(None if line is None else line.T[:, :3, 3])
         links = {text: name for name, text in PAGES.items() if (path.parent / name).exists()}
         played = {first: (times, q)} | motions
-        view.save_html(path, interactive=True, motions=played, caption="\n".join(lines), links=links)
+        view.save_html(
+            path, interactive=True, motions=played, caption="\n".join(lines), links=links
+        )
     return f"{path}, with sliders, the table and {1 + len(motions)} motions"
 
 
@@ -278,7 +296,12 @@ def _save(arm: Arm, path: Path, title: str, motions: Mapping[str, Motion], capti
     links = {"the arm, its branches and all motions": "index.html"}
     with arm.view() as view:
         view.save_html(
-            path, interactive=True, motions=motions, title=f"{arm.name}: {title} · dhkit", caption=caption, links=links
+            path,
+            interactive=True,
+            motions=motions,
+            title=f"{arm.name}: {title} · dhkit",
+            caption=caption,
+            links=links,
         )
 
 

@@ -73,7 +73,11 @@ def _along(arm: Arm, path: Array) -> Array:
 def _stops(arm: Arm) -> list[Array]:
     """Return the named configurations inside the limits, each once; with few, states with a single joint moved too."""
     numbers = arm.description.numbers
-    inside = [q for q in arm.configurations.values() if np.all((q >= numbers.lower) & (q <= numbers.upper))]
+    inside = [
+        q
+        for q in arm.configurations.values()
+        if np.all((q >= numbers.lower) & (q <= numbers.upper))
+    ]
     stops: list[Array] = []
     for q in inside or [np.clip(np.zeros(arm.n), numbers.lower, numbers.upper)]:
         if not any(np.array_equal(q, stop) for stop in stops):
@@ -82,7 +86,11 @@ def _stops(arm: Arm) -> list[Array]:
     for i in range(arm.n):
         moved = first.copy()
         room = 0.7 if not numbers.prismatic[i] else 0.3 * max(arm.description.reach, 0.1)
-        moved[i] = moved[i] + room if moved[i] + room <= numbers.upper[i] else max(moved[i] - room, numbers.lower[i])
+        moved[i] = (
+            moved[i] + room
+            if moved[i] + room <= numbers.upper[i]
+            else max(moved[i] - room, numbers.lower[i])
+        )
         stops += [moved] if len(stops) < 4 else []
     return stops
 
@@ -98,7 +106,11 @@ def race(arm: Arm, intervals: int | None = None) -> tuple[Trajectory, Trajectory
         There are no such motions.
     """
     numbers = arm.description.numbers
-    needed = ((numbers.mass, "body"), (numbers.velocity, "speed limit"), (numbers.effort, "torque limit"))
+    needed = (
+        (numbers.mass, "body"),
+        (numbers.velocity, "speed limit"),
+        (numbers.effort, "torque limit"),
+    )
     for values, quantity in needed:
         if not np.isfinite(values).all():
             i = int(np.flatnonzero(~np.isfinite(values))[0])
@@ -110,11 +122,18 @@ def race(arm: Arm, intervals: int | None = None) -> tuple[Trajectory, Trajectory
 def moved_configurations(arm: Arm) -> tuple[Array, Array]:
     """Return a configuration inside the limits, a named one if possible, and one with every joint moved; (n,) each."""
     numbers = arm.description.numbers
-    inside = {name: q for name, q in arm.configurations.items() if np.all((q >= numbers.lower) & (q <= numbers.upper))}
+    inside = {
+        name: q
+        for name, q in arm.configurations.items()
+        if np.all((q >= numbers.lower) & (q <= numbers.upper))
+    }
     name = next((name for name in (*PREFERRED_CONFIGURATIONS, *inside) if name in inside), None)
     start = np.clip(np.zeros(arm.n), numbers.lower, numbers.upper) if name is None else inside[name]
     distance = np.where(numbers.prismatic, MAX_TRANSLATION * arm.description.reach, MAX_ROTATION)
-    up, down = (np.minimum(distance, LIMIT_SHARE * room) for room in (numbers.upper - start, start - numbers.lower))
+    up, down = (
+        np.minimum(distance, LIMIT_SHARE * room)
+        for room in (numbers.upper - start, start - numbers.lower)
+    )
     return start, start + np.where(up >= down, up, -down)
 
 

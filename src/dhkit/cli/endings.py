@@ -6,7 +6,9 @@ import signal
 import threading
 from types import FrameType
 
-END_SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+END_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
 """Signals by which a grader's time limit or a closed terminal ends a command."""
 
 
@@ -23,7 +25,9 @@ def _interrupt(_: int, frame: FrameType | None) -> None:
     # A second signal would disturb the end that the first has begun.
     for number in END_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    interrupt = signal.getsignal(signal.SIGINT)  # raises KeyboardInterrupt where nothing discards it
+    interrupt = signal.getsignal(
+        signal.SIGINT
+    )  # raises KeyboardInterrupt where nothing discards it
     if not callable(interrupt):
         raise KeyboardInterrupt
     interrupt(signal.SIGINT, frame)

@@ -60,17 +60,25 @@ def _lagrangian_of(description: Description, symbols: str, base: bool) -> Lagran
     """
     choices: Mapping[str, Symbols] = {"none": "none", "file": "file", "inertial": "inertial"}
     if base and symbols not in ("file", "inertial"):
-        raise DescriptionError(f"--symbols {symbols}: base parameters are made of symbols; leave one of the two out")
+        raise DescriptionError(
+            f"--symbols {symbols}: base parameters are made of symbols; leave one of the two out"
+        )
     if symbols not in choices:
         raise DescriptionError(f"--symbols: found {symbols!r}; expected {', '.join(choices)}")
-    return base_parameters(description).lagrangian if base else lagrangian(description, choices[symbols])
+    return (
+        base_parameters(description).lagrangian
+        if base
+        else lagrangian(description, choices[symbols])
+    )
 
 
 def _kinematics_of(description: Description, symbols: str, base: bool) -> SymbolicKinematics:
     if base:
         raise DescriptionError("--base-parameters: A, T and J have no inertial parameters")
     if symbols not in ("none", "file"):
-        raise DescriptionError(f"--symbols: found {symbols!r}; expected none or file for A, T and J")
+        raise DescriptionError(
+            f"--symbols: found {symbols!r}; expected none or file for A, T and J"
+        )
     return symbolic_kinematics(description, "none" if symbols == "none" else "file")
 
 
@@ -83,7 +91,9 @@ def equations(
             help="Quantities: any of M, C, h, g, tau, K, V; or any of A (A1 ... An), T, J; or ik, inverse kinematics."
         ),
     ] = "M,C,g",
-    form: Annotated[str, typer.Option("--format", help="Format: text, latex, python, c, matlab or html.")] = "text",
+    form: Annotated[
+        str, typer.Option("--format", help="Format: text, latex, python, c, matlab or html.")
+    ] = "text",
     symbols: Annotated[
         str,
         typer.Option(
@@ -98,7 +108,10 @@ def equations(
         ),
     ] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab, and for ik as code.")
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="File to write; a folder for matlab, and for ik as code."
+        ),
     ] = None,
     uniform: Uniform = False,
     json: Json = False,
@@ -110,11 +123,15 @@ def equations(
     if what.strip().lower() == INVERSE:
         if base or symbols != "file":
             option = "--base-parameters" if base else "--symbols"
-            raise DescriptionError(f"--what ik: names the lengths of the table itself; leave {option} out")
+            raise DescriptionError(
+                f"--what ik: names the lengths of the table itself; leave {option} out"
+            )
         _inverse(arm.description, form, output, json)
         return
     if INVERSE in what.replace(",", " ").split():
-        raise DescriptionError(f"--what: found {what!r}; expected ik alone, which is printed by itself")
+        raise DescriptionError(
+            f"--what: found {what!r}; expected ik alone, which is printed by itself"
+        )
     if is_kinematic(what):
         kinematics = _kinematics_of(arm.description, symbols, base)
         lag: Source = kinematics
@@ -141,14 +158,22 @@ def _inverse(description: Description, form: str, output: Path | None, json: boo
         return
     if form in CODE:
         files = derivation.code(form)
-        text = "\n".join(files.values()) if len(files) == 1 else "\n".join(f"/* {k} */\n{v}" for k, v in files.items())
+        text = (
+            "\n".join(files.values())
+            if len(files) == 1
+            else "\n".join(f"/* {k} */\n{v}" for k, v in files.items())
+        )
     elif form == "latex":
-        text = latex_document(derivation.latex(), f"{description.name[:MAX_TITLE_LENGTH]}: inverse kinematics")
+        text = latex_document(
+            derivation.latex(), f"{description.name[:MAX_TITLE_LENGTH]}: inverse kinematics"
+        )
     else:
         text = derivation.html() if form == "html" else derivation.text()
     if output is not None:
         if output.is_dir() or output.suffix == ".toml":
-            raise DescriptionError(f"{output}: expected the name of a file that is not a robot file")
+            raise DescriptionError(
+                f"{output}: expected the name of a file that is not a robot file"
+            )
         check_place(output)
         write_atomically(output, text)
         report_files([output], json=json)
@@ -156,7 +181,14 @@ def _inverse(description: Description, form: str, output: Path | None, json: boo
         facts = {"robot": description.name, "what": [INVERSE], "format": form, "text": text}
         proof = derivation.prove()
         facts |= {"family": derivation.family.name, "branches": list(derivation.branches)}
-        print_json({**facts, "proved": bool(proof), "proof": proof.statement, "notes": list(derivation.notes)})
+        print_json(
+            {
+                **facts,
+                "proved": bool(proof),
+                "proof": proof.statement,
+                "notes": list(derivation.notes),
+            }
+        )
     else:
         sys.stdout.write(text)
 
@@ -164,10 +196,14 @@ def _inverse(description: Description, form: str, output: Path | None, json: boo
 def _write(lag: Source, shown: Sequence[Quantity], form: str, output: Path) -> list[Path]:
     """Write a file, or for MATLAB a file for each function into a folder; return the paths."""
     if output.suffix == ".toml":
-        raise DescriptionError(f"{output}: equations would overwrite a robot file; expected another name")
+        raise DescriptionError(
+            f"{output}: equations would overwrite a robot file; expected another name"
+        )
     if form == "matlab":
         if output.suffix or (output.exists() and not output.is_dir()):
-            raise DescriptionError(f"{output}: expected a folder; MATLAB wants a file for every function")
+            raise DescriptionError(
+                f"{output}: expected a folder; MATLAB wants a file for every function"
+            )
         contents = {output / name: text for name, text in matlab_files(lag, shown).items()}
     else:
         if output.is_dir():

@@ -27,7 +27,16 @@ if TYPE_CHECKING:
     from dhkit.symbolic.exact.lagrangian import Lagrangian
     from dhkit.symbolic.kinematics import SymbolicKinematics
 
-UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m", "d": "m", "g": "m/s²"} | {
+UNITS = {
+    "m": "kg",
+    "r": "kg m",
+    "I": "kg m²",
+    "Jm": "kg m²",
+    "G": "",
+    "a": "m",
+    "d": "m",
+    "g": "m/s²",
+} | {
     "M": "kg",
     "MX": "kg m",
     "MY": "kg m",
@@ -58,7 +67,10 @@ def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Qu
         DHTable.of(description)._repr_html_(),
         *_sections(quantities),
         *_constants(lag, quantities),
-        *(f'<p class="note">{escape(note)}</p>' for note in [*lag.notes, *renamings(_elements(quantities))]),
+        *(
+            f'<p class="note">{escape(note)}</p>'
+            for note in [*lag.notes, *renamings(_elements(quantities))]
+        ),
     ]
     return html_page(f"{description.name}: {subject}", "\n".join(part for part in body if part))
 
@@ -72,7 +84,9 @@ def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:
         yield f'<h2>Sines and cosines</h2>\n<div class="display">{equation_mathml(latex)}</div>'
 
 
-def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> Iterator[str]:
+def _constants(
+    lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]
+) -> Iterator[str]:
     """Yield a table of the constants in the quantities, with their values."""
     elements = _elements(quantities)
     values = dict(lag.description.numbers.values) | lag.arm.parameters
@@ -88,7 +102,9 @@ def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quanti
     yield "<h2>Constants</h2>\n<table>\n<tr><th></th><th>name</th><th>value</th><th>unit</th></tr>"
     for name in names:
         value = float(values.get(name, math.nan))
-        cells = f"<td>{equation_mathml(constant_latex(rings[name], name))}</td><td>{escape(name)}</td>"
+        cells = (
+            f"<td>{equation_mathml(constant_latex(rings[name], name))}</td><td>{escape(name)}</td>"
+        )
         yield f'<tr>{cells}<td class="number">{value:.6g}</td><td>{_unit(lag, name)}</td></tr>'
     yield "</table>"
 

@@ -27,27 +27,47 @@ app = typer.Typer(rich_markup_mode=None)
 
 @app.command()
 def extract(
-    urdf: Annotated[str, typer.Argument(metavar="FILE", help="A URDF, or example:NAME of example-robot-data.")],
+    urdf: Annotated[
+        str, typer.Argument(metavar="FILE", help="A URDF, or example:NAME of example-robot-data.")
+    ],
     base: Annotated[
-        str | None, typer.Option(help="First link of the chain, which becomes the world; default: the root.")
+        str | None,
+        typer.Option(help="First link of the chain, which becomes the world; default: the root."),
     ] = None,
-    tip: Annotated[str | None, typer.Option(help="Last link of the chain; not needed if there is one chain.")] = None,
+    tip: Annotated[
+        str | None, typer.Option(help="Last link of the chain; not needed if there is one chain.")
+    ] = None,
     modified: Annotated[
-        bool, typer.Option("--modified", help="Return a modified (Craig's) table, not a standard one.")
+        bool,
+        typer.Option("--modified", help="Return a modified (Craig's) table, not a standard one."),
     ] = False,
     as_designed: Annotated[
-        bool, typer.Option("--as-designed", help="Read 1.5708 as a right angle, and say what that changes.")
+        bool,
+        typer.Option(
+            "--as-designed", help="Read 1.5708 as a right angle, and say what that changes."
+        ),
     ] = False,
     exact: Annotated[
-        bool, typer.Option("--exact", help="Keep axes that rounded angles leave a little from parallel as they are.")
+        bool,
+        typer.Option(
+            "--exact",
+            help="Keep axes that rounded angles leave a little from parallel as they are.",
+        ),
     ] = False,
     drop: Annotated[
-        bool, typer.Option("--drop-side", help="Leave out links after joints beside the chain; else they are frozen.")
+        bool,
+        typer.Option(
+            "--drop-side",
+            help="Leave out links after joints beside the chain; else they are frozen.",
+        ),
     ] = False,
     package_dir: Annotated[
-        list[Path] | None, typer.Option(help="Folder with packages that package:// names; may be given again.")
+        list[Path] | None,
+        typer.Option(help="Folder with packages that package:// names; may be given again."),
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="The robot file to write (.toml).")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The robot file to write (.toml).")
+    ] = None,
     json: Json = False,
 ) -> ExitStatus:
     """Find the Denavit-Hartenberg table of a URDF's chain, with its bodies, limits and meshes.
@@ -76,7 +96,10 @@ def extract(
         if files:
             say(f"wrote {files[0]}" + (f" and {len(files) - 1} meshes" if len(files) > 1 else ""))
     size = max(1.0, extraction.description.reach)
-    agrees = extraction.changes or extraction.residual.largest <= (TOLERANCE + TURNED * extraction.turned) * size
+    agrees = (
+        extraction.changes
+        or extraction.residual.largest <= (TOLERANCE + TURNED * extraction.turned) * size
+    )
     return ExitStatus.FINE if agrees else ExitStatus.NO
 
 
@@ -91,7 +114,9 @@ def chain_of(name: str, base: str | None, tip: str | None) -> tuple[Path, str | 
     path, own_base, own_tip = urdf_source(name)
     for name_of_link, option, own in (("base", base, own_base), ("tip", tip, own_tip)):
         if option is not None and own is not None:
-            raise DescriptionError(f"{name}: --{name_of_link} {option}: found #{own} too; expected one of them")
+            raise DescriptionError(
+                f"{name}: --{name_of_link} {option}: found #{own} too; expected one of them"
+            )
     return path, own_base if base is None else base, own_tip if tip is None else tip
 
 
@@ -99,9 +124,17 @@ def list_examples(json: bool) -> None:
     """Print the chains of example-robot-data that load by name."""
     chains = list(example_chains())
     if json:
-        print_json([{"name": c.name, "joints": list(c.joints), "base": c.base, "tip": c.tip} for c in chains])
+        print_json(
+            [
+                {"name": c.name, "joints": list(c.joints), "base": c.base, "tip": c.tip}
+                for c in chains
+            ]
+        )
         return
-    print_table(("name", "joints", "tip"), [(chain.name, str(len(chain.joints)), chain.tip) for chain in chains])
+    print_table(
+        ("name", "joints", "tip"),
+        [(chain.name, str(len(chain.joints)), chain.tip) for chain in chains],
+    )
 
 
 def _show(extraction: Extraction) -> None:

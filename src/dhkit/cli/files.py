@@ -38,9 +38,14 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def build(
     robot: Robot,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="URDF to write; default: ./NAME.urdf.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="URDF to write; default: ./NAME.urdf.")
+    ] = None,
     mesh_prefix: Annotated[
-        str | None, typer.Option(help="Prefix of the meshes' names, as package://my_robot/meshes/; default: meshes/.")
+        str | None,
+        typer.Option(
+            help="Prefix of the meshes' names, as package://my_robot/meshes/; default: meshes/."
+        ),
     ] = None,
     uniform: Uniform = False,
     json: Json = False,
@@ -49,7 +54,9 @@ def build(
     arm = load_arm(robot, uniform)
     path = output or Path(f"{arm.name}.urdf")
     if path.suffix == ".toml":
-        raise DescriptionError(f"{path}: a URDF would overwrite a robot file; expected another name")
+        raise DescriptionError(
+            f"{path}: a URDF would overwrite a robot file; expected another name"
+        )
     check_place(path)
     files = arm.write_urdf(path, mesh_prefix)
     report_files(files, json=json)
@@ -59,25 +66,40 @@ def build(
 def import_cad(
     folder: Annotated[
         Path,
-        typer.Argument(help="Mesh files, one a link, exported in one pose in assembly coordinates; or a .mat file."),
+        typer.Argument(
+            help="Mesh files, one a link, exported in one pose in assembly coordinates; or a .mat file."
+        ),
     ],
-    table: Annotated[str, typer.Option("--table", help="The DH table: a robot file (.toml) or a library name.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The new folder: robot.toml, robot.urdf, meshes.")],
-    density: Annotated[float | None, typer.Option(help="Density of all links, kg/m^3; none is assumed.")] = None,
+    table: Annotated[
+        str, typer.Option("--table", help="The DH table: a robot file (.toml) or a library name.")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="The new folder: robot.toml, robot.urdf, meshes.")
+    ],
+    density: Annotated[
+        float | None, typer.Option(help="Density of all links, kg/m^3; none is assumed.")
+    ] = None,
     mass: Annotated[
-        list[str] | None, typer.Option(metavar="LINK=KG", help="Mass of one link; may be given again.")
+        list[str] | None,
+        typer.Option(metavar="LINK=KG", help="Mass of one link; may be given again."),
     ] = None,
     report: Annotated[
-        list[Path] | None, typer.Option(help="Mass properties from the CAD program: SolidWorks' text or a .csv.")
+        list[Path] | None,
+        typer.Option(help="Mass properties from the CAD program: SolidWorks' text or a .csv."),
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="Unit of the files: m, cm, mm or in; default: guessed from the size.")
+        str | None,
+        typer.Option(help="Unit of the files: m, cm, mm or in; default: guessed from the size."),
     ] = None,
-    simplify: Annotated[int | None, typer.Option(metavar="N", help="Reduce each part to N triangles.")] = None,
+    simplify: Annotated[
+        int | None, typer.Option(metavar="N", help="Reduce each part to N triangles.")
+    ] = None,
     mapping: Annotated[
         list[str] | None,
         typer.Option(
-            "--map", metavar="LINK=FILE", help="File of a link whose name does not say it; may be given again."
+            "--map",
+            metavar="LINK=FILE",
+            help="File of a link whose name does not say it; may be given again.",
         ),
     ] = None,
     at: Annotated[
@@ -88,7 +110,9 @@ def import_cad(
         ),
     ] = None,
     degrees: Annotated[bool, degrees_option("Angles of --at are in degrees.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace an earlier import in the folder.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace an earlier import in the folder.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Make a robot of a CAD assembly's parts and a DH table: meshes in their links' frames, masses, TOML and URDF."""
@@ -99,7 +123,9 @@ def import_cad(
         unit=unit,
         q=None if at is None else option_values(arm, at, "--at", degrees, OutsideLimits.WARN),
         density=density,
-        mass={link: _mass(link, text) for link, text in _pairs(mass or (), "--mass", "1=3.2").items()},
+        mass={
+            link: _mass(link, text) for link, text in _pairs(mass or (), "--mass", "1=3.2").items()
+        },
         reports=report or (),
         simplify=simplify,
         files=_files(mapping or ()),
@@ -108,13 +134,21 @@ def import_cad(
     warnings = [note for note in imported.notes if note.startswith("warning: ")]
     if json:
         links = {str(link): len(mesh.faces) for link, mesh in imported.meshes.items()}
-        print_json({"files": [str(path) for path in written], "notes": list(imported.notes), "triangles": links})
+        print_json(
+            {
+                "files": [str(path) for path in written],
+                "notes": list(imported.notes),
+                "triangles": links,
+            }
+        )
         return
     for note in imported.notes:
         say(note, "yellow" if note in warnings else "")
     bare = [i for i, joint in enumerate(imported.description.joints, start=1) if not joint.bodies]
     if bare:
-        say(f"no body: link{'s' * (len(bare) > 1)} {', '.join(map(str, bare))}; state --density, --mass or --report")
+        say(
+            f"no body: link{'s' * (len(bare) > 1)} {', '.join(map(str, bare))}; state --density, --mass or --report"
+        )
     say_written(written)
 
 
@@ -147,7 +181,9 @@ def _mass(link: int, text: str) -> float:
 def _files(mapping: Sequence[str]) -> dict[int, list[str]] | None:
     """Read --map: the files of links, and after "-=" those that are left out."""
     left_out = [match[1] for match in map(LEFT_OUT_PAIR.fullmatch, mapping) if match]
-    pairs = _pairs([word for word in mapping if not LEFT_OUT_PAIR.fullmatch(word)], "--map", '"3=forearm.stl"')
+    pairs = _pairs(
+        [word for word in mapping if not LEFT_OUT_PAIR.fullmatch(word)], "--map", '"3=forearm.stl"'
+    )
     files = {link: _names(text) for link, text in pairs.items()}
     if left_out:
         files[LEFT_OUT] = _names(",".join(left_out))

@@ -44,39 +44,61 @@ PRINTED = Delivery()
 @app.command()
 def grade(
     sheets: Annotated[
-        list[Path] | None, typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them.")
+        list[Path] | None,
+        typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them."),
     ] = None,
     robot: Annotated[
         str | None, typer.Option(help="A library name or a robot file, instead of the sheets' own.")
     ] = None,
     task: Annotated[
         Path | None,
-        typer.Option(help="The instructor's file: robot, [task], [names], [rubric]; or a lab's assignment (.toml)."),
+        typer.Option(
+            help="The instructor's file: robot, [task], [names], [rubric]; or a lab's assignment (.toml)."
+        ),
     ] = None,
-    rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the answers (.toml).")] = None,
+    rubric: Annotated[
+        Path | None, typer.Option(help="Rubric: points of the answers (.toml).")
+    ] = None,
     execute: Annotated[
-        bool, typer.Option("--execute", help="Execute programs in processes of their own, instead of reading them.")
+        bool,
+        typer.Option(
+            "--execute", help="Execute programs in processes of their own, instead of reading them."
+        ),
     ] = False,
     isolated: Isolated = False,
     read: Annotated[bool, typer.Option("--read", help="Show how each entry was read.")] = False,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")] = None,
-    form: Annotated[str, typer.Option("--format", help="Format: text, json, gradescope, junit or html.")] = "text",
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")
+    ] = None,
+    form: Annotated[
+        str, typer.Option("--format", help="Format: text, json, gradescope, junit or html.")
+    ] = "text",
     feedback: Annotated[
-        str | None, typer.Option(help="Feedback: full, hint or verdict; default: that of the rubric.")
+        str | None,
+        typer.Option(help="Feedback: full, hint or verdict; default: that of the rubric."),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Number of processes; default: one for each core.")
+        int | None,
+        typer.Option(min=1, max=1024, help="Number of processes; default: one for each core."),
     ] = None,
     seconds: Annotated[
-        float, typer.Option(min=0.1, help="Processor time for judging a sheet, s; four times as long on the clock.")
+        float,
+        typer.Option(
+            min=0.1, help="Processor time for judging a sheet, s; four times as long on the clock."
+        ),
     ] = 60.0,
     remark: Annotated[
         bool, typer.Option("--remark", help="Mark earlier reports (JSON) again, without judging.")
     ] = False,
-    template: Annotated[str | None, typer.Option(help="Print an empty sheet for this robot.")] = None,
-    explain: Annotated[str | None, typer.Option(help="Print this robot's worked solution, step by step.")] = None,
+    template: Annotated[
+        str | None, typer.Option(help="Print an empty sheet for this robot.")
+    ] = None,
+    explain: Annotated[
+        str | None, typer.Option(help="Print this robot's worked solution, step by step.")
+    ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write; a folder for several sheets.")
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; a folder for several sheets."),
     ] = None,
     json: Json = False,
 ) -> ExitStatus:
@@ -92,7 +114,9 @@ def grade(
     if sheets and task is not None and is_assignment(task):
         return grade_records(sheets, task, "json" if json else form, output)
     if not sheets:
-        raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
+        raise DescriptionError(
+            "no answer sheet; expected files or folders, --template NAME or --explain NAME"
+        )
     delivery = Delivery("json" if json else form, feedback, output, read)
     if remark:
         return mark_again(sheets, rubric_of(rubric), delivery)
@@ -121,9 +145,13 @@ def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | N
         The assignment cannot be read, or the output does not end in .csv.
     """
     if form not in ("text", "json"):
-        raise AnswerError(f"--format {form}: records of a lab have the forms text and json; --output marks.csv")
+        raise AnswerError(
+            f"--format {form}: records of a lab have the forms text and json; --output marks.csv"
+        )
     if output is not None and output.suffix.lower() != ".csv":
-        raise DescriptionError(f"{output}: ends in {output.suffix!r}; expected .csv for the marks of a lab")
+        raise DescriptionError(
+            f"{output}: ends in {output.suffix!r}; expected .csv for the marks of a lab"
+        )
     assignment = Assignment.read(task)
     marks = lab_marks(find_records(paths), assignment)
     if output is not None:
@@ -138,9 +166,18 @@ def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | N
             if mark.unchecked:
                 notes.append(f"{counted(mark.unchecked, 'goal')} on the record's word")
             rows.append(
-                (mark.student, f"{mark.points:g}", f"{mark.most:g}", mark.last, str(mark.file), "; ".join(notes))
+                (
+                    mark.student,
+                    f"{mark.points:g}",
+                    f"{mark.most:g}",
+                    mark.last,
+                    str(mark.file),
+                    "; ".join(notes),
+                )
             )
-        print_table(("student", "points", "of", "last goal", "file", "notes"), rows, title=assignment.title)
+        print_table(
+            ("student", "points", "of", "last goal", "file", "notes"), rows, title=assignment.title
+        )
     if any(mark.notes for mark in marks):
         return ExitStatus.UNUSABLE
     return ExitStatus.FINE if all(mark.points >= mark.most for mark in marks) else ExitStatus.NO
@@ -226,7 +263,9 @@ def grade_files(
     are_several = len(sheets) > 1 or any(path.is_dir() for path in sheets)
     if are_several:
         prepare(about)
-    own_files = [path for path in (rubric, task, Path(robot) if robot else None) if path is not None]
+    own_files = [
+        path for path in (rubric, task, Path(robot) if robot else None) if path is not None
+    ]
     isolation = None
     if execute:
         packages = read.task.packages if read is not None else ()
@@ -385,7 +424,9 @@ def _write_explanation(arm: Arm, form: str, output: Path | None) -> ExitStatus:
     """
     forms = {"text": explanation_text, "html": explanation_html}
     if form not in forms:
-        raise AnswerError(f"--format: found {form!r}; expected {', '.join(forms)} for a worked solution")
+        raise AnswerError(
+            f"--format: found {form!r}; expected {', '.join(forms)} for a worked solution"
+        )
     return _deliver(forms[form](arm.description), output)
 
 

@@ -81,7 +81,9 @@ class Delivery:
         if self.form not in FORMS:
             raise AnswerError(f"--format: found {self.form!r}; expected {', '.join(FORMS)}")
         if self.feedback is not None and self.feedback not in get_args(Feedback):
-            raise AnswerError(f"--feedback: found {self.feedback!r}; expected {', '.join(get_args(Feedback))}")
+            raise AnswerError(
+                f"--feedback: found {self.feedback!r}; expected {', '.join(get_args(Feedback))}"
+            )
         if self.form == "gradescope" and several:
             raise AnswerError(
                 "--format gradescope: found several sheets; expected one, which is what Gradescope hands in"
@@ -90,10 +92,14 @@ class Delivery:
         if output is None or output.is_dir():
             return
         if output.suffix.lower() in SHEET_SUFFIXES:
-            raise AnswerError(f"{output}: a report would overwrite an answer sheet; expected another name")
+            raise AnswerError(
+                f"{output}: a report would overwrite an answer sheet; expected another name"
+            )
         if _is_folder(output, self.form, several):
             if output.exists() or output.suffix:
-                raise AnswerError(f"{output}: found a file's name; expected a folder for the reports of several sheets")
+                raise AnswerError(
+                    f"{output}: found a file's name; expected a folder for the reports of several sheets"
+                )
         else:
             try:
                 check_place(output)
@@ -143,20 +149,29 @@ def _document(shown: Sequence[Graded], form: str, level: Feedback, several: bool
         case "json":
             return "".join(f"{_json(one, level)}\n" for one in shown)
         case "gradescope":
-            return jsons.dumps(gradescope(first.report, first.marks), ensure_ascii=False, indent=2) + "\n"
+            return (
+                jsons.dumps(gradescope(first.report, first.marks), ensure_ascii=False, indent=2)
+                + "\n"
+            )
         case "junit":
             return junit(*_columns(shown))
         case "html":
-            return html_class(*_columns(shown)) if several else html_report(first.report, first.marks)
+            return (
+                html_class(*_columns(shown)) if several else html_report(first.report, first.marks)
+            )
         case _:
             file = io.StringIO()
-            page = Console(file=file, width=FILE_WIDTH, highlight=False, color_system=None, soft_wrap=True)
+            page = Console(
+                file=file, width=FILE_WIDTH, highlight=False, color_system=None, soft_wrap=True
+            )
             page.print(terminal_report(first.report, first.marks))
             return file.getvalue()
 
 
 def _json(one: Graded, level: Feedback) -> str:
-    return jsons.dumps(json_report(one.report, one.marks, level), ensure_ascii=False, allow_nan=False)
+    return jsons.dumps(
+        json_report(one.report, one.marks, level), ensure_ascii=False, allow_nan=False
+    )
 
 
 def _columns(graded: Sequence[Graded]) -> tuple[list[GradeReport], list[Marks]]:
@@ -179,7 +194,10 @@ def _names(graded: Sequence[Graded]) -> list[str]:
     names: dict[str, str] = {}
     for one in graded:
         student = one.report.student or Path(one.report.sheet or "sheet").stem
-        plain = UNSAFE.sub("_", student).encode()[:MAX_NAME_BYTES].decode(errors="ignore").lstrip(".") or "sheet"
+        plain = (
+            UNSAFE.sub("_", student).encode()[:MAX_NAME_BYTES].decode(errors="ignore").lstrip(".")
+            or "sheet"
+        )
         name = plain
         number = 1
         while name.casefold() in names:

@@ -43,7 +43,14 @@ def robots(
         print_json(facts)
         return
     rows = [
-        (arm.name, arm.kinds, arm.convention.value, f"{tool_reach(arm):.2f}", _shortened(arm.source)) for arm in arms
+        (
+            arm.name,
+            arm.kinds,
+            arm.convention.value,
+            f"{tool_reach(arm):.2f}",
+            _shortened(arm.source),
+        )
+        for arm in arms
     ]
     print_table(("name", "joints", "DH", "reach [m]", "source"), rows)
 
@@ -63,21 +70,49 @@ def info(robot: Robot, json: Json = False) -> None:
         say(f"source: {description.source}")
     say(f"\n{arm.dh}\n")
     if description.parameters:
-        say("parameters (SI): " + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.values.items()) + "\n")
+        say(
+            "parameters (SI): "
+            + ", ".join(f"{k} = {v:.6g}" for k, v in numbers.values.items())
+            + "\n"
+        )
     rows = [_joint_row(i, joint, description) for i, joint in enumerate(description.joints)]
-    print_table(("joint", "limits", "speed", "effort", "mass [kg]", "gear² J [kg m²]", "friction", "assumed"), rows)
+    print_table(
+        (
+            "joint",
+            "limits",
+            "speed",
+            "effort",
+            "mass [kg]",
+            "gear² J [kg m²]",
+            "friction",
+            "assumed",
+        ),
+        rows,
+    )
     for i, joint in enumerate(description.joints, start=1):
         if len(joint.bodies) > 1:
-            bodies = (f"{b['name']} of {b['mass_kg']:.4g} kg at {_vector(b['com_m'])} m" for b in _bodies(joint, arm))
+            bodies = (
+                f"{b['name']} of {b['mass_kg']:.4g} kg at {_vector(b['com_m'])} m"
+                for b in _bodies(joint, arm)
+            )
             say(f"link {i}: {', '.join(bodies)}")
     for coupling in description.couplings:
         i, j = coupling.joints
-        say(f"joints {i} and {j} both turn a drive: {numbers.coupling[i - 1, j - 1]:.4g} in M{i}{j} (SI)")
+        say(
+            f"joints {i} and {j} both turn a drive: {numbers.coupling[i - 1, j - 1]:.4g} in M{i}{j} (SI)"
+        )
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
     say(f"\ninverse kinematics: {arm.family}")
-    mass = f"total mass {np.nansum(numbers.mass):.4g} kg" if np.isfinite(numbers.mass).any() else "no link masses"
+    mass = (
+        f"total mass {np.nansum(numbers.mass):.4g} kg"
+        if np.isfinite(numbers.mass).any()
+        else "no link masses"
+    )
     say(f"{mass}{base_mass}, gravity {_vector(numbers.gravity)} m/s²")
-    for frame, T in (("base in the world", numbers.T_world_base), ("tool in the last frame", numbers.T_last_tool)):
+    for frame, T in (
+        ("base in the world", numbers.T_world_base),
+        ("tool in the last frame", numbers.T_last_tool),
+    ):
         if not np.array_equal(T, np.eye(4)):
             xyz, angles = pose_parts(T, degrees=True)
             say(f"{frame}: {_vector(xyz)} m, XYZ {_vector(angles)}°")
@@ -93,7 +128,10 @@ def info(robot: Robot, json: Json = False) -> None:
 @app.command(context_settings={"ignore_unknown_options": True})
 def fk(
     robot: Robot,
-    q: Annotated[list[str], typer.Argument(help="Joint values, or the name of a configuration such as ready.")],
+    q: Annotated[
+        list[str],
+        typer.Argument(help="Joint values, or the name of a configuration such as ready."),
+    ],
     degrees: Degrees = False,
     frames: Annotated[bool, typer.Option("--frames", help="Print all DH frames too.")] = False,
     json: Json = False,
@@ -105,7 +143,11 @@ def fk(
     link_frames = arm.frames(values)
     if json:
         xyz, angles = pose_parts(T, degrees=degrees)
-        pose = {"T": T.tolist(), "xyz_m": xyz.tolist(), angle_key("euler_XYZ", degrees=degrees): angles.tolist()}
+        pose = {
+            "T": T.tolist(),
+            "xyz_m": xyz.tolist(),
+            angle_key("euler_XYZ", degrees=degrees): angles.tolist(),
+        }
         given = joint_entry(arm, "q", values, degrees=degrees)
         print_json(given | pose | ({"frames": link_frames.tolist()} if frames else {}))
         return
@@ -115,7 +157,9 @@ def fk(
     for name, frame in [*named, ("tool", T)]:
         xyz, angles = pose_parts(frame, degrees=degrees)
         rows.append((name, *(f"{x:.6f}" for x in (*xyz + 0.0, *angles + 0.0))))
-    print_table(("", "x [m]", "y [m]", "z [m]", *(f"{axis} [{unit}]" for axis in ("X", "Y'", "Z''"))), rows)
+    print_table(
+        ("", "x [m]", "y [m]", "z [m]", *(f"{axis} [{unit}]" for axis in ("X", "Y'", "Z''"))), rows
+    )
     say(f"\n{np.array2string(T + 0.0, precision=6, suppress_small=True)}")
 
 
@@ -125,7 +169,9 @@ def _joint_row(i: int, joint: Joint, description: Description) -> tuple[str, ...
     limited = np.isfinite(numbers.lower[i])
     return (
         f"{i + 1} {joint.name}",
-        f"{numbers.lower[i] * scale:.5g}{unit} to {numbers.upper[i] * scale:.5g}{unit}" if limited else "unlimited",
+        f"{numbers.lower[i] * scale:.5g}{unit} to {numbers.upper[i] * scale:.5g}{unit}"
+        if limited
+        else "unlimited",
         f"{numbers.velocity[i] * scale:.4g}{unit}/s" if joint.velocity is not None else "unlimited",
         f"{numbers.effort[i]:.4g} {force}" if joint.effort is not None else "unlimited",
         "no body" if not joint.bodies else f"{numbers.mass[i]:.4g}",
@@ -138,7 +184,10 @@ def _joint_row(i: int, joint: Joint, description: Description) -> tuple[str, ...
 def _friction(viscous: float, forwards: float, backwards: float) -> str:
     """Return a joint's viscous friction, and its dry friction in both directions, as text; empty for no friction."""
     dry = f"{forwards:.3g}" if forwards == -backwards else f"{forwards:.3g}/{backwards:.3g}"
-    parts = [f"{viscous:.3g} qd" if viscous else "", f"±{dry}" if forwards == -backwards and forwards else dry]
+    parts = [
+        f"{viscous:.3g} qd" if viscous else "",
+        f"±{dry}" if forwards == -backwards and forwards else dry,
+    ]
     return " ".join(part for part in parts if part and part != "0")
 
 
@@ -148,7 +197,9 @@ def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:
     bodies = []
     for body in joint.bodies:
         com = [float(substitute(x, values)) for x in body.com]
-        bodies.append({"name": body.name, "mass_kg": float(substitute(body.mass, values)), "com_m": com})
+        bodies.append(
+            {"name": body.name, "mass_kg": float(substitute(body.mass, values)), "com_m": com}
+        )
     return bodies
 
 
@@ -169,7 +220,12 @@ def _number_keys(joint: Joint) -> dict[str, str]:
     q, drive = ("rad", "N_m") if joint.is_revolute else ("m", "N")
     armature = "armature_kg_m2" if joint.is_revolute else "armature_kg"
     table = {"theta": "theta_rad", "d": "d_m", "a": "a_m", "alpha": "alpha_rad", "mass": "mass_kg"}
-    limits = {"lower": f"lower_{q}", "upper": f"upper_{q}", "velocity": f"velocity_{q}_s", "effort": f"effort_{drive}"}
+    limits = {
+        "lower": f"lower_{q}",
+        "upper": f"upper_{q}",
+        "velocity": f"velocity_{q}_s",
+        "effort": f"effort_{drive}",
+    }
     return table | limits | {"armature": armature}
 
 
@@ -179,7 +235,11 @@ def _facts(arm: Arm) -> dict[str, Any]:
     fit = classify(description).fit
     joints = []
     for i, joint in enumerate(description.joints):
-        facts: dict[str, Any] = {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
+        facts: dict[str, Any] = {
+            "name": joint.name,
+            "type": joint.type.value,
+            "assumed": list(joint.assumed),
+        }
         for column, key in _number_keys(joint).items():
             facts[key] = float(getattr(numbers, column)[i])
         facts["bodies"] = _bodies(joint, arm)
@@ -197,7 +257,10 @@ def _facts(arm: Arm) -> dict[str, Any]:
         "parameters": numbers.values,
         "joints": joints,
         "couplings": [
-            {"joints": list(c.joints), "inertia": float(numbers.coupling[c.joints[0] - 1, c.joints[1] - 1])}
+            {
+                "joints": list(c.joints),
+                "inertia": float(numbers.coupling[c.joints[0] - 1, c.joints[1] - 1]),
+            }
             for c in description.couplings
         ],
         "configurations_rad": {name: q.tolist() for name, q in numbers.configurations.items()},

@@ -102,7 +102,11 @@ class ReachedPose:
         is_proved = self.solutions.status_code == IKStatus.out_of_reach
         if self.method is Method.NUMERIC:
             verdict = "out of reach" if is_proved else "no solution found by iteration"
-            missing = f"misses the position by {distance:.4g} m" if distance > 0 else "misses the orientation"
+            missing = (
+                f"misses the position by {distance:.4g} m"
+                if distance > 0
+                else "misses the orientation"
+            )
             return f"{verdict}: the best try {missing}"
         if not is_proved:
             return f"no solution found by {self.method}, which does not prove that there is none"
@@ -111,22 +115,38 @@ class ReachedPose:
         return "out of reach: farther from axis 1 than all links in one line"
 
 
-@app.command(cls=with_long_options({"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}))
+@app.command(
+    cls=with_long_options(
+        {"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}
+    )
+)
 def ik(
     robot: Robot,
-    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")] = None,
+    xyz: Annotated[
+        str | None, typer.Option(metavar="X Y Z", help="The tool's position, m.")
+    ] = None,
     euler: EulerAngles = "0 0 0",
     order: EulerOrder = "XYZ",
     matrix: Annotated[
-        str | None, typer.Option(metavar="M11 ... M44", help="The pose by row, 16 or 12 numbers; or a file of them.")
+        str | None,
+        typer.Option(
+            metavar="M11 ... M44", help="The pose by row, 16 or 12 numbers; or a file of them."
+        ),
     ] = None,
-    like: Annotated[str | None, typer.Option(metavar="Q ...", help="The tool pose of these joint values.")] = None,
+    like: Annotated[
+        str | None, typer.Option(metavar="Q ...", help="The tool pose of these joint values.")
+    ] = None,
     near: Annotated[
-        str | None, typer.Option(metavar="Q ...", help="Mark the branch nearest to these joint values.")
+        str | None,
+        typer.Option(metavar="Q ...", help="Mark the branch nearest to these joint values."),
     ] = None,
     degrees: Degrees = False,
-    limits: Annotated[bool, typer.Option("--limits", help="Print only branches inside the joint limits.")] = False,
-    numeric: Annotated[bool, typer.Option("--numeric", help="Find one solution by iteration, for any arm.")] = False,
+    limits: Annotated[
+        bool, typer.Option("--limits", help="Print only branches inside the joint limits.")
+    ] = False,
+    numeric: Annotated[
+        bool, typer.Option("--numeric", help="Find one solution by iteration, for any arm.")
+    ] = False,
     json: Json = False,
 ) -> ExitStatus:
     """Print every way to put the tool at a pose, given by --xyz, --matrix or --like; exit status 1 where there is none.
@@ -135,7 +155,9 @@ def ik(
     """
     arm = read_arm(robot)
     T = target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees)
-    near_q = None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED)
+    near_q = (
+        None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED)
+    )
     solutions, method, note = _solve(arm, T, near_q, limits=limits, numeric=numeric)
     shown = solutions.allowed if limits else solutions.valid
     reached = ReachedPose(
@@ -157,7 +179,9 @@ def ik(
     return ExitStatus.FINE if reached.shown else ExitStatus.NO
 
 
-def _solve(arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool) -> tuple[IKSolutions, Method, str]:
+def _solve(
+    arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool
+) -> tuple[IKSolutions, Method, str]:
     """Return solutions, the method that found them, and the reason for an unexpected method."""
     note = ""
     if not numeric:
@@ -185,7 +209,9 @@ def _with_whole_turns(solutions: IKSolutions, near: Array | None) -> Array:
     everywhere = replace(solutions, flags=solutions.flags & ~np.uint8(IKFlag.out_of_limits))
     q = everywhere.within_limits(near)
     turns = np.where(
-        solutions.prismatic | (near is None), 0.0, np.rint(((0.0 if near is None else near) - solutions.q) / math.tau)
+        solutions.prismatic | (near is None),
+        0.0,
+        np.rint(((0.0 if near is None else near) - solutions.q) / math.tau),
     )
     outside = (q < solutions.lower - LIMIT_SLACK) | (q > solutions.upper + LIMIT_SLACK)
     return np.where(outside, solutions.q + math.tau * turns, q)
@@ -204,18 +230,34 @@ def _print(reached: ReachedPose) -> None:
         return
     prismatic = arm.description.numbers.prismatic
     units = ["m" if slides else unit for slides in prismatic]
-    headings = ["", "branch", *(f"q{i + 1} [{unit}]" for i, unit in enumerate(units)), "limits", "special"]
+    headings = [
+        "",
+        "branch",
+        *(f"q{i + 1} [{unit}]" for i, unit in enumerate(units)),
+        "limits",
+        "special",
+    ]
     print_table(headings, [_line(reached, k) for k in reached.shown])
     say(f"\n{_summary(reached)}")
 
 
 def _line(reached: ReachedPose, k: int) -> tuple[str, ...]:
     prismatic = reached.arm.description.numbers.prismatic
-    shown = np.where(prismatic, reached.q[k], np.degrees(reached.q[k])) if reached.degrees else reached.q[k]
+    shown = (
+        np.where(prismatic, reached.q[k], np.degrees(reached.q[k]))
+        if reached.degrees
+        else reached.q[k]
+    )
     digits = np.where(prismatic, 6, 4 if reached.degrees else 6)
     values = [f"{_rounded(x, int(d)):.{d}f}" for x, d in zip(shown, digits, strict=True)]
     mark = NEAREST_MARK if k == reached.nearest else ""
-    return mark, reached.solutions.branches[k], *values, _limits(reached, k), ", ".join(reached.flags(k))
+    return (
+        mark,
+        reached.solutions.branches[k],
+        *values,
+        _limits(reached, k),
+        ", ".join(reached.flags(k)),
+    )
 
 
 def _limits(reached: ReachedPose, k: int) -> str:
@@ -237,8 +279,14 @@ def _summary(reached: ReachedPose) -> str:
         text = f"{count} of {len(solutions)} branches reach the pose, {inside} inside the limits"
     else:
         by = "iteration" if reached.method is Method.NUMERIC else reached.method
-        text = f"{count} solution{'s' if count > 1 else ''} found by {by}, {inside} inside the limits"
-    return text if nearest is None else f"{text}; {NEAREST_MARK} nearest: {solutions.branches[nearest]}"
+        text = (
+            f"{count} solution{'s' if count > 1 else ''} found by {by}, {inside} inside the limits"
+        )
+    return (
+        text
+        if nearest is None
+        else f"{text}; {NEAREST_MARK} nearest: {solutions.branches[nearest]}"
+    )
 
 
 def _facts(reached: ReachedPose) -> dict[str, Any]:

@@ -13,11 +13,16 @@ from dhkit.execution import Isolation, find_isolation
 
 Isolated = Annotated[
     bool,
-    typer.Option("--isolated", help="For programs of others: refuse to run what cannot be isolated on this system."),
+    typer.Option(
+        "--isolated",
+        help="For programs of others: refuse to run what cannot be isolated on this system.",
+    ),
 ]
 
 
-def isolation_for(program: str, required: bool, hidden: Iterable[Path] = (), packages: Sequence[str] = ()) -> Isolation:
+def isolation_for(
+    program: str, required: bool, hidden: Iterable[Path] = (), packages: Sequence[str] = ()
+) -> Isolation:
     """Return how a program is run; where it is not isolated, say so on stderr.
 
     Parameters

@@ -13,7 +13,10 @@ from dhkit.description import robots as library_names
 from dhkit.description.joint_text import DEGREES
 
 Robot = Annotated[
-    str, typer.Argument(help="A library name (see `dhkit robots`), a robot file (.toml) or a URDF; FILE.urdf#TIP.")
+    str,
+    typer.Argument(
+        help="A library name (see `dhkit robots`), a robot file (.toml) or a URDF; FILE.urdf#TIP."
+    ),
 ]
 
 
@@ -30,17 +33,25 @@ def degrees_option(text: str) -> Any:
 
 Degrees = Annotated[bool, degrees_option("Angles in and out are in degrees.")]
 Uniform = Annotated[
-    bool, typer.Option("--uniform-links", help="Replace the bodies of the links by thin uniform rods of 1 kg each.")
+    bool,
+    typer.Option(
+        "--uniform-links", help="Replace the bodies of the links by thin uniform rods of 1 kg each."
+    ),
 ]
 Columns = Annotated[
     str | None,
     typer.Option(
-        "--columns", metavar="OURS=THEIRS ...", help='Columns of a file of another program, such as "t=tout q=yout".'
+        "--columns",
+        metavar="OURS=THEIRS ...",
+        help='Columns of a file of another program, such as "t=tout q=yout".',
     ),
 ]
 EulerAngles = Annotated[str, typer.Option(metavar="A B C", help="Euler angles of the tool, rad.")]
 EulerOrder = Annotated[
-    str, typer.Option(help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones.")
+    str,
+    typer.Option(
+        help="Convention of the Euler angles: XYZ about moving axes, xyz about fixed ones."
+    ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the random states.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
@@ -70,7 +81,9 @@ def as_designed_option() -> Any:
     command.__annotations__["as_designed"] = Annotated[bool, option]
     app = typer.Typer()
     app.command()(command)
-    parameter = next(each for each in typer.main.get_command(app).params if each.name == "as_designed")
+    parameter = next(
+        each for each in typer.main.get_command(app).params if each.name == "as_designed"
+    )
     parameter.expose_value = False
     return parameter
 

@@ -83,7 +83,9 @@ def report_files(files: Iterable[object], *, json: bool) -> None:
 
 def print_json(value: object, indent: int | None = None) -> None:
     """Print a value as one JSON document, in which NaN and infinity are null."""
-    plain = "utf" not in (sys.stdout.encoding or "").lower()  # a letter that is replaced would be another text
+    plain = (
+        "utf" not in (sys.stdout.encoding or "").lower()
+    )  # a letter that is replaced would be another text
     try:
         text = json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent)
         # Unsafe characters stand in strings alone, where JSON has escapes for them.
@@ -93,7 +95,9 @@ def print_json(value: object, indent: int | None = None) -> None:
         raise _reader_gone() from None
 
 
-def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
+def print_table(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None
+) -> None:
     """Print a table, with columns of numbers aligned to the right."""
     table = Table(
         title=None if title is None else visible(title),
@@ -105,7 +109,9 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: s
     cells = [list(row) for row in rows]
     for k, heading in enumerate(headings):
         numeric = bool(cells) and all(_is_number(row[k]) for row in cells)
-        table.add_column(Text(visible(heading)), justify="right" if numeric else "left", overflow="fold")
+        table.add_column(
+            Text(visible(heading)), justify="right" if numeric else "left", overflow="fold"
+        )
     for row in cells:
         table.add_row(*(Text(visible(cell)) for cell in row))
     console().print(table)
@@ -147,7 +153,9 @@ def check_outputs(outputs: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
         if path is None:
             continue
         if path.suffix.lower() not in expected:
-            raise DescriptionError(f"{path}: ends in {path.suffix!r}; expected {', '.join(expected)}")
+            raise DescriptionError(
+                f"{path}: ends in {path.suffix!r}; expected {', '.join(expected)}"
+            )
         check_place(path)
 
 
@@ -202,7 +210,12 @@ class MotionFiles:
         check_outputs(((self.data, suffixes), (self.page, PAGES), (self.figure, FIGURES)))
 
     def write(
-        self, arm: Arm, motion: Trajectory | SimulationResult, name: str, caption: str, obstacles: Scene | None = None
+        self,
+        arm: Arm,
+        motion: Trajectory | SimulationResult,
+        name: str,
+        caption: str,
+        obstacles: Scene | None = None,
     ) -> list[str]:
         """Write the files of a motion, and return their paths; the name and the caption are those on the page."""
         written = [] if self.data is None else [motion.save(self.data)]
@@ -211,7 +224,11 @@ class MotionFiles:
                 if obstacles is not None:
                     view.obstacles(obstacles)
                 view.play(motion)
-                written.append(view.save_html(self.page, interactive=True, motions={name: motion}, caption=caption))
+                written.append(
+                    view.save_html(
+                        self.page, interactive=True, motions={name: motion}, caption=caption
+                    )
+                )
         if self.figure is not None:
             from dhkit.viewer import plot
 

@@ -41,7 +41,19 @@ MIN_ACTIVE_SHARE = 0.005
 """Smallest share of the time for which an active limit is printed."""
 SUFFIXES = (*ARCHIVES, *TABLES)
 LONG_OPTIONS: dict[str, int | None] = {
-    **dict.fromkeys(("--from", "--to", "--via", "--matrix", "--like", "--objective", "--payload", "--box", "--sphere")),
+    **dict.fromkeys(
+        (
+            "--from",
+            "--to",
+            "--via",
+            "--matrix",
+            "--like",
+            "--objective",
+            "--payload",
+            "--box",
+            "--sphere",
+        )
+    ),
     **dict.fromkeys(("--velocity", "--acceleration", "--jerk", "--torque")),
     "--xyz": 3,
     "--euler": 3,
@@ -56,88 +68,140 @@ app = typer.Typer(rich_markup_mode=None)
 def plan(
     robot: Robot,
     start: Annotated[
-        str, typer.Option("--from", metavar="Q ...", help="Joint values at the start, or a configuration's name.")
+        str,
+        typer.Option(
+            "--from", metavar="Q ...", help="Joint values at the start, or a configuration's name."
+        ),
     ] = "ready",
     to: Annotated[
-        str | None, typer.Option(metavar="Q ...", help="Joint values at the goal, or the name of a configuration.")
+        str | None,
+        typer.Option(
+            metavar="Q ...", help="Joint values at the goal, or the name of a configuration."
+        ),
     ] = None,
-    xyz: Annotated[str | None, typer.Option(metavar="X Y Z", help="Tool position at the goal, m.")] = None,
+    xyz: Annotated[
+        str | None, typer.Option(metavar="X Y Z", help="Tool position at the goal, m.")
+    ] = None,
     euler: EulerAngles = "0 0 0",
     order: EulerOrder = "XYZ",
     matrix: Annotated[
         str | None,
-        typer.Option(metavar="M11 ... M44", help="Tool pose at the goal by row, 16 or 12 numbers; or a file of them."),
+        typer.Option(
+            metavar="M11 ... M44",
+            help="Tool pose at the goal by row, 16 or 12 numbers; or a file of them.",
+        ),
     ] = None,
     like: Annotated[
-        str | None, typer.Option(metavar="Q ...", help="Goal: the tool pose of these joint values, by any branch.")
+        str | None,
+        typer.Option(
+            metavar="Q ...", help="Goal: the tool pose of these joint values, by any branch."
+        ),
     ] = None,
     via: Annotated[
-        list[str] | None, typer.Option(metavar="Q ...", help="Joint values to pass on the way; may be given again.")
+        list[str] | None,
+        typer.Option(metavar="Q ...", help="Joint values to pass on the way; may be given again."),
     ] = None,
     coordinates: Annotated[
         str | None,
         typer.Option(
-            metavar="X,Y,...", help="Coordinates of the pose that count, for arms that meet no more; see dhkit ik."
+            metavar="X,Y,...",
+            help="Coordinates of the pose that count, for arms that meet no more; see dhkit ik.",
         ),
     ] = None,
     wanted: Annotated[
         str,
         typer.Option(
-            "--objective", help='Objective: time, effort, energy, jerk, or a sum such as "time + 1e-4 effort".'
+            "--objective",
+            help='Objective: time, effort, energy, jerk, or a sum such as "time + 1e-4 effort".',
         ),
     ] = "time",
-    duration: Annotated[float | None, typer.Option(help="Duration, s, for objectives without time.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Duration, s, for objectives without time.")
+    ] = None,
     speed: Annotated[
         float, typer.Option(min=0.001, max=1, help="Share of the velocity limits that may be used.")
     ] = 1.0,
     velocity: Annotated[
         str | None,
-        typer.Option(metavar="V ...", help="Velocity limits instead of the robot's, one or one for each joint; rad/s."),
+        typer.Option(
+            metavar="V ...",
+            help="Velocity limits instead of the robot's, one or one for each joint; rad/s.",
+        ),
     ] = None,
     acceleration: Annotated[
-        str | None, typer.Option(metavar="A ...", help="Acceleration limits, one or one for each joint; rad/s^2.")
+        str | None,
+        typer.Option(
+            metavar="A ...", help="Acceleration limits, one or one for each joint; rad/s^2."
+        ),
     ] = None,
     jerk: Annotated[
-        str | None, typer.Option(metavar="J ...", help="Jerk limits, one or one for each joint; rad/s^3.")
+        str | None,
+        typer.Option(metavar="J ...", help="Jerk limits, one or one for each joint; rad/s^3."),
     ] = None,
     torque: Annotated[
         str | None,
-        typer.Option(metavar="T ...", help="Torque limits instead of the robot's, one or one for each joint; N m."),
+        typer.Option(
+            metavar="T ...",
+            help="Torque limits instead of the robot's, one or one for each joint; N m.",
+        ),
     ] = None,
     load: Annotated[
         str | None,
         typer.Option(
-            "--payload", metavar="KG [@ X Y Z]", help="Payload, kg, and its centre of mass in the tool's frame, m."
+            "--payload",
+            metavar="KG [@ X Y Z]",
+            help="Payload, kg, and its centre of mass in the tool's frame, m.",
         ),
     ] = None,
-    tool_speed: Annotated[float | None, typer.Option(help="Limit of the tool's speed, m/s.")] = None,
+    tool_speed: Annotated[
+        float | None, typer.Option(help="Limit of the tool's speed, m/s.")
+    ] = None,
     box: Annotated[
         list[str] | None,
-        typer.Option(metavar="SX SY SZ @ X Y Z", help="Box to avoid: edge lengths and centre, m; may be given again."),
+        typer.Option(
+            metavar="SX SY SZ @ X Y Z",
+            help="Box to avoid: edge lengths and centre, m; may be given again.",
+        ),
     ] = None,
     sphere: Annotated[
         list[str] | None,
-        typer.Option(metavar="R @ X Y Z", help="Sphere to avoid: radius and centre, m; may be given again."),
+        typer.Option(
+            metavar="R @ X Y Z", help="Sphere to avoid: radius and centre, m; may be given again."
+        ),
     ] = None,
-    floor: Annotated[str | None, typer.Option(metavar="Z", help="Height of a floor to stay above, m.")] = None,
-    clearance: Annotated[float, typer.Option(min=0, help="Smallest distance from obstacles, m.")] = 0.01,
+    floor: Annotated[
+        str | None, typer.Option(metavar="Z", help="Height of a floor to stay above, m.")
+    ] = None,
+    clearance: Annotated[
+        float, typer.Option(min=0, help="Smallest distance from obstacles, m.")
+    ] = 0.01,
     self_collision: Annotated[
         bool, typer.Option("--self-collision", help="Avoid collisions between links too.")
     ] = False,
-    line: Annotated[bool, typer.Option("--line", help="Move the tool along a straight line.")] = False,
-    intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Number of mesh intervals.")] = None,
+    line: Annotated[
+        bool, typer.Option("--line", help="Move the tool along a straight line.")
+    ] = False,
+    intervals: Annotated[
+        int | None, typer.Option(min=6, max=2000, help="Number of mesh intervals.")
+    ] = None,
     max_iterations: Annotated[
         int, typer.Option(min=1, help="Limit of the search, iterations of the optimizer.")
     ] = MAX_ITERATIONS,
     time_limit: Annotated[
-        float | None, typer.Option(min=0.01, help="Limit of the search besides, s; the result then depends on it.")
+        float | None,
+        typer.Option(
+            min=0.01, help="Limit of the search besides, s; the result then depends on it."
+        ),
     ] = None,
     degrees: Degrees = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml.")
+        Path | None,
+        typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml."),
     ] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays the motion.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Write a figure of the motion: .png, .svg or .pdf.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Write a figure of the motion: .png, .svg or .pdf.")
+    ] = None,
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
@@ -161,7 +225,9 @@ def plan(
     scene = obstacles(box or (), sphere or (), floor)
     options = PlanOptions(
         via=tuple(option_values(arm, place, "--via", degrees) for place in via or ()),
-        coordinates=None if coordinates is None else tuple(name.strip() for name in coordinates.split(",")),
+        coordinates=None
+        if coordinates is None
+        else tuple(name.strip() for name in coordinates.split(",")),
         duration=duration,
         limits=limits,
         payload=parse_payload(load),
@@ -185,9 +251,18 @@ def plan(
             if line:
                 path = _line(arm, begin_q, goal, options)
                 fineness = PATH_INTERVALS if intervals is None else intervals
-                motion = arm.plan_path(path, sought, constraints=constraints, intervals=fineness, options=options)
+                motion = arm.plan_path(
+                    path, sought, constraints=constraints, intervals=fineness, options=options
+                )
             else:
-                motion = arm.plan(begin_q, goal, sought, constraints=constraints, intervals=intervals, options=options)
+                motion = arm.plan(
+                    begin_q,
+                    goal,
+                    sought,
+                    constraints=constraints,
+                    intervals=intervals,
+                    options=options,
+                )
     except PlanningError as error:
         if json:
             print_json({"robot": arm.name, "found": False, "reason": str(error), "files": []})
@@ -231,16 +306,22 @@ def _line(arm: Arm, start: Array, goal: Array, options: PlanOptions) -> JointPat
         There is no such path.
     """
     if options.via:
-        raise DescriptionError("--line: found --via too; expected a motion straight from start to goal, without")
+        raise DescriptionError(
+            "--line: found --via too; expected a motion straight from start to goal, without"
+        )
     if options.coordinates is not None:
-        raise DescriptionError("--line: found --coordinates too; expected a line, on which all coordinates count")
+        raise DescriptionError(
+            "--line: found --coordinates too; expected a line, on which all coordinates count"
+        )
     T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
     return joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options.limits)
 
 
 def _caption(report: PlanReport) -> str:
     """Return a page's text about a motion: its kind, its constraints, and the limits that are active."""
-    active = ", ".join(f"{name} ({100 * share:.0f} % of the time)" for name, share in report.active_limits()[:3])
+    active = ", ".join(
+        f"{name} ({100 * share:.0f} % of the time)" for name, share in report.active_limits()[:3]
+    )
     sentences = [
         f"A planned motion: {report.title}, certified by {report.certificate.reference}.",
         f"At its limits: {active}." if active else "",
@@ -250,7 +331,9 @@ def _caption(report: PlanReport) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_time: bool, degrees: bool) -> None:
+def _print(
+    arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_time: bool, degrees: bool
+) -> None:
     report: PlanReport = motion.report
     certificate = report.certificate
     along = ", the tool along a straight line" if line else ""
@@ -259,12 +342,16 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
     say(f"{seconds_text(report.duration)}{cost}\n")
     _print_joints(arm, motion, limits, degrees)
     worst = certificate.worst
-    verdict = "all limits kept" if certificate.ok else f"limits exceeded by {certificate.violation:.1e}"
+    verdict = (
+        "all limits kept" if certificate.ok else f"limits exceeded by {certificate.violation:.1e}"
+    )
     active = [(name, share) for name, share in report.active_limits() if share >= MIN_ACTIVE_SHARE]
     active_text = ", ".join(f"{name} {100 * share:.0f} %" for name, share in active) or "none"
     say(f"\ncertificate: {verdict} in {certificate.states} states, by {certificate.reference}")
     if worst is not None:
-        say(f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s")
+        say(
+            f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s"
+        )
     say(f"some limit reached in {100 * certificate.any_active:.0f} % of the time: {active_text}")
     if report.unlimited:
         say(f"not limited: {', '.join(report.unlimited)}")
@@ -275,7 +362,9 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
     for note in report.notes:
         say(note)
     if report.coarse is not None and report.sensitivity is not None:
-        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {more_text(report.sensitivity)}")
+        say(
+            f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {more_text(report.sensitivity)}"
+        )
     say(
         f"search: {report.solves} program{'s' * (report.solves != 1)}, {report.iterations} iterations, "
         f"{report.solve_seconds:.2f} s, and {report.build_seconds:.2f} s to make them"
@@ -309,7 +398,9 @@ def _print_joints(arm: Arm, motion: Trajectory, limits: Limits, degrees: bool) -
     for i, joint in enumerate(arm.description.joints):
         angle_unit = "°" if degrees else "rad"
         unit = "m" if numbers.prismatic[i] else angle_unit
-        ends = [f"{round(float(scale[i] * q[i]), 4) + 0.0:.4f}" for q in (samples.q[0], samples.q[-1])]
+        ends = [
+            f"{round(float(scale[i] * q[i]), 4) + 0.0:.4f}" for q in (samples.q[0], samples.q[-1])
+        ]
         rows.append((joint.name, *ends, unit, *(column[i] for column in shares)))
     headings = ("joint", "from", "to", "", "largest rate [%]", "largest torque [% of limit]")
     print_table(headings[: len(rows[0])], rows)
@@ -317,4 +408,7 @@ def _print_joints(arm: Arm, motion: Trajectory, limits: Limits, degrees: bool) -
 
 def _shares(values: Array, limits: Array) -> list[str]:
     shares = np.abs(values).max(axis=0) / limits
-    return [f"{100 * x:.0f}" if limit < np.inf else "no limit" for x, limit in zip(shares, limits, strict=True)]
+    return [
+        f"{100 * x:.0f}" if limit < np.inf else "no limit"
+        for x, limit in zip(shares, limits, strict=True)
+    ]

@@ -26,7 +26,12 @@ from dhkit.cli.output import (
     write_figure,
 )
 from dhkit.cli.progress import ProgressBar
-from dhkit.cli.simulation_settings import chosen_motion, known_and_moving_arm, simulation_options, tuned_controller
+from dhkit.cli.simulation_settings import (
+    chosen_motion,
+    known_and_moving_arm,
+    simulation_options,
+    tuned_controller,
+)
 from dhkit.cli.units import joint_entry
 from dhkit.control import CONTROLLERS, Sensors, SimulationResult, compare as compare_controllers
 from dhkit.errors import SimulationError
@@ -38,11 +43,14 @@ SUFFIXES = (".npz", ".mat", ".csv")
 
 app = typer.Typer(rich_markup_mode=None)
 
-LONG_OPTIONS: dict[str, int | None] = dict.fromkeys(("--from", "--to", "--payload", "--push", "--columns"))
+LONG_OPTIONS: dict[str, int | None] = dict.fromkeys(
+    ("--from", "--to", "--payload", "--push", "--columns")
+)
 Motion = Annotated[
     Path | None,
     typer.Option(
-        "--motion", help="File of the motion to follow: .npz, .mat, .csv or .yaml, of dhkit or of another program."
+        "--motion",
+        help="File of the motion to follow: .npz, .mat, .csv or .yaml, of dhkit or of another program.",
     ),
 ]
 Start = Annotated[
@@ -65,13 +73,16 @@ Goal = Annotated[
 ]
 Duration = Annotated[
     float | None,
-    typer.Option(help="Duration of a motion between configurations, s; default: twice the least, 2 at least."),
+    typer.Option(
+        help="Duration of a motion between configurations, s; default: twice the least, 2 at least."
+    ),
 ]
 Bandwidth = Annotated[float, typer.Option(help="Bandwidth that gains are tuned for, rad/s.")]
 Damping = Annotated[float, typer.Option(help="Damping ratio that gains are tuned for.")]
 Rate = Annotated[float, typer.Option(help="Sampling rate of the controller, Hz.")]
 PlantRate = Annotated[
-    float | None, typer.Option(help="Rate of the integration's steps, Hz; default: that of the controller.")
+    float | None,
+    typer.Option(help="Rate of the integration's steps, Hz; default: that of the controller."),
 ]
 Load = Annotated[
     str | None,
@@ -81,14 +92,20 @@ Load = Annotated[
         help="Payload, kg, and its centre of mass in the tool's frame, m; default: that of the planned motion.",
     ),
 ]
-Unmodelled = Annotated[bool, typer.Option("--unmodelled", help="The controller's model has no payload.")]
+Unmodelled = Annotated[
+    bool, typer.Option("--unmodelled", help="The controller's model has no payload.")
+]
 FrictionOption = Annotated[
     str,
     typer.Option(
-        "--friction", metavar="none|stiction|WIDTH", help="Joint friction; WIDTH, rad/s, is that of smooth friction."
+        "--friction",
+        metavar="none|stiction|WIDTH",
+        help="Joint friction; WIDTH, rad/s, is that of smooth friction.",
     ),
 ]
-Restitution = Annotated[float, typer.Option(help="Coefficient of restitution of the joint stops, 0 to 1.")]
+Restitution = Annotated[
+    float, typer.Option(help="Coefficient of restitution of the joint stops, 0 to 1.")
+]
 NoStops = Annotated[bool, typer.Option("--no-stops", help="Simulate without joint stops.")]
 PushOption = Annotated[
     list[str] | None,
@@ -119,25 +136,41 @@ def simulate(
     rate: Rate = 1000.0,
     plant_rate: PlantRate = None,
     continuous: Annotated[
-        bool, typer.Option("--continuous", help="Run the controller in continuous time, without a sampling rate.")
+        bool,
+        typer.Option(
+            "--continuous", help="Run the controller in continuous time, without a sampling rate."
+        ),
     ] = False,
     load: Load = None,
     unmodelled: Unmodelled = False,
     friction: FrictionOption = "none",
-    compensate: Annotated[bool, typer.Option("--compensate", help="Let the controller compensate friction.")] = False,
+    compensate: Annotated[
+        bool, typer.Option("--compensate", help="Let the controller compensate friction.")
+    ] = False,
     restitution: Restitution = 0.0,
     no_stops: NoStops = False,
     push: PushOption = None,
     noise: Annotated[
-        float, typer.Option(min=0, help="Standard deviation of measured joint values; rad, with --degrees too, and m.")
+        float,
+        typer.Option(
+            min=0,
+            help="Standard deviation of measured joint values; rad, with --degrees too, and m.",
+        ),
     ] = 0.0,
     resolution: Annotated[
-        float, typer.Option(min=0, help="Resolution of the encoders at the joints; rad, also with --degrees, and m.")
+        float,
+        typer.Option(
+            min=0, help="Resolution of the encoders at the joints; rad, also with --degrees, and m."
+        ),
     ] = 0.0,
     degrees: Degrees = False,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the run: .npz, .mat or .csv.")
+    ] = None,
     html: Annotated[Path | None, typer.Option(help="Write a page that plays the motion.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Write a figure of the motion: .png, .svg or .pdf.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Write a figure of the motion: .png, .svg or .pdf.")
+    ] = None,
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
@@ -147,7 +180,9 @@ def simulate(
     trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
     arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
     stops = None if no_stops else restitution
-    options = simulation_options(plant, None if continuous else rate, plant_rate, friction, stops, push or ())
+    options = simulation_options(
+        plant, None if continuous else rate, plant_rate, friction, stops, push or ()
+    )
     files = MotionFiles(output, html, figure)
     files.check(SUFFIXES)
     tuned = tuned_controller(controller, arm, trajectory, bandwidth, damping, compensate)
@@ -156,7 +191,9 @@ def simulate(
     result = None
     try:
         with ProgressBar("simulating") as bar:
-            result = arm.simulate(tuned, trajectory, options=options, sensors=sensors, progress=bar.show)
+            result = arm.simulate(
+                tuned, trajectory, options=options, sensors=sensors, progress=bar.show
+            )
     except SimulationError as error:
         failure = str(error)
         result = error.result
@@ -174,8 +211,13 @@ def simulate(
         print_json({**head, **facts, "files": written})
     else:
         if result is not None:
-            say(f"{arm.name}: {controller}, {'continuous' if continuous else f'{rate:g} Hz'}", "bold")
-            say(f"{_about(text, trajectory, arm, plant)}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n")
+            say(
+                f"{arm.name}: {controller}, {'continuous' if continuous else f'{rate:g} Hz'}",
+                "bold",
+            )
+            say(
+                f"{_about(text, trajectory, arm, plant)}; {result.t[-1]:g} s simulated in {seconds:.2f} s\n"
+            )
             _print(result, degrees=degrees)
         if written:
             say("")
@@ -247,7 +289,9 @@ def _facts(arm: Arm, result: SimulationResult, *, degrees: bool) -> dict[str, ob
 @app.command(cls=with_long_options(LONG_OPTIONS))
 def compare(
     robot: Robot,
-    controllers: Annotated[str, typer.Option(help="Names of controllers, separated by commas; default: all.")] = "",
+    controllers: Annotated[
+        str, typer.Option(help="Names of controllers, separated by commas; default: all.")
+    ] = "",
     motion: Motion = None,
     columns: Columns = None,
     start: Start = None,
@@ -272,7 +316,9 @@ def compare(
     bare = load_arm(robot, uniform)
     trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
     arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
-    options = simulation_options(plant, rate, plant_rate, friction, None if no_stops else restitution, push or ())
+    options = simulation_options(
+        plant, rate, plant_rate, friction, None if no_stops else restitution, push or ()
+    )
     about = f"{_about(text, trajectory, arm, plant)}, {rate:g} Hz"
     check_outputs(((figure, FIGURES),))
     names = [name.strip() for name in controllers.split(",")] if controllers else list(CONTROLLERS)
@@ -291,7 +337,10 @@ def compare(
 
         write_figure(plot_comparison(comparison.results, f"{arm.name}: {about}"), figure)
     if json:
-        facts = {name: _facts(arm, result, degrees=degrees) for name, result in comparison.results.items()}
+        facts = {
+            name: _facts(arm, result, degrees=degrees)
+            for name, result in comparison.results.items()
+        }
         print_json({"robot": arm.name, "controllers": facts, "failures": dict(comparison.failures)})
     else:
         say(f"{arm.name}: {about}, {bandwidth:g} rad/s\n", "bold")

@@ -10,7 +10,14 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.arguments import columns, numbers, option_values, split_at
 from dhkit.cli.demo_motions import moved_configurations
-from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, SimulationOptions, make_controller
+from dhkit.control import (
+    CONTROLLERS,
+    Controller,
+    FrictionCompensation,
+    Push,
+    SimulationOptions,
+    make_controller,
+)
 from dhkit.description import Array, Payload
 from dhkit.description.joint_text import joint_text
 from dhkit.dynamics import Friction
@@ -38,8 +45,12 @@ def tuned_controller(
     if name == NO_CONTROLLER:
         return None
     if name not in CONTROLLERS:
-        raise ValueError(f"controller is {name!r}; expected {', '.join(CONTROLLERS)} or {NO_CONTROLLER}")
-    controller = make_controller(name, arm.description, bandwidth, damping, motion.q(motion.duration / 2))
+        raise ValueError(
+            f"controller is {name!r}; expected {', '.join(CONTROLLERS)} or {NO_CONTROLLER}"
+        )
+    controller = make_controller(
+        name, arm.description, bandwidth, damping, motion.q(motion.duration / 2)
+    )
     return FrictionCompensation(controller, arm) if compensate else controller
 
 
@@ -64,8 +75,12 @@ def chosen_motion(
     """
     if path is not None:
         if start or goal or duration is not None:
-            raise DescriptionError("--motion: found --from, --to or --duration too; expected the file alone")
-        return read_motion(path, arm.description, degrees=degrees, columns=columns(names)), str(path)
+            raise DescriptionError(
+                "--motion: found --from, --to or --duration too; expected the file alone"
+            )
+        return read_motion(path, arm.description, degrees=degrees, columns=columns(names)), str(
+            path
+        )
     begin, end = moved_configurations(arm)
     begin = begin if start is None else option_values(arm, start, "--from", degrees)
     end = end if goal is None else option_values(arm, goal, "--to", degrees)
@@ -76,7 +91,9 @@ def chosen_motion(
     if duration is None:
         numbers = arm.description.numbers
         has_limits = np.isfinite(numbers.velocity).any() or np.isfinite(numbers.effort).any()
-        duration = max(MIN_DURATION, 2 * arm.quintic(begin, end).duration) if has_limits else MIN_DURATION
+        duration = (
+            max(MIN_DURATION, 2 * arm.quintic(begin, end).duration) if has_limits else MIN_DURATION
+        )
     text = f"quintic from {_configuration_text(arm, begin)} to {_configuration_text(arm, end)}"
     return arm.quintic(begin, end, duration), text
 
@@ -84,9 +101,16 @@ def chosen_motion(
 def _configuration_text(arm: Arm, q: Array) -> str:
     """Return the name of a configuration, shape (n,), or its values."""
     configurations = {"zero": np.zeros(arm.n)} | dict(arm.configurations)
-    name = next((name for name, values in configurations.items() if np.array_equal(values, q)), None)
+    name = next(
+        (name for name, values in configurations.items() if np.array_equal(values, q)), None
+    )
     slides = arm.description.numbers.prismatic.tolist()
-    return name or "(" + ", ".join(joint_text(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True)) + ")"
+    return (
+        name
+        or "("
+        + ", ".join(joint_text(x, slides=s, digits=4) for x, s in zip(q, slides, strict=True))
+        + ")"
+    )
 
 
 def known_and_moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) -> tuple[Arm, Arm]:
@@ -99,7 +123,9 @@ def known_and_moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) ->
     """
     if carried is None:
         if unmodelled:
-            raise DescriptionError("--unmodelled: found no --payload; expected one that the controller does not know")
+            raise DescriptionError(
+                "--unmodelled: found no --payload; expected one that the controller does not know"
+            )
         return arm, arm
     loaded = arm.with_payload(carried)
     return (arm if unmodelled else loaded), loaded
@@ -118,7 +144,9 @@ def _friction_of(text: str) -> bool | Friction:
     try:
         width = float(text)
     except ValueError:
-        raise DescriptionError(f"--friction: found {text!r}; expected none, stiction or a width in rad/s") from None
+        raise DescriptionError(
+            f"--friction: found {text!r}; expected none, stiction or a width in rad/s"
+        ) from None
     try:
         return Friction(width)
     except ValueError as error:
@@ -139,7 +167,9 @@ def pushes(texts: Sequence[str]) -> list[Push]:
     for text in texts:
         force, times = split_at(text)
         if times is None:
-            raise DescriptionError(f'--push: found {text!r}; expected "FX FY FZ @ BEGIN END", N and s')
+            raise DescriptionError(
+                f'--push: found {text!r}; expected "FX FY FZ @ BEGIN END", N and s'
+            )
         begin, end = numbers([times], "--push", [2])
         parsed.append(Push(numbers([force], "--push", [3]), begin=float(begin), end=float(end)))
     return parsed

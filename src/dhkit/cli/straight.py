@@ -14,7 +14,17 @@ from dhkit.kinematics import classify
 LINE_POSES = 200
 LINE_LENGTHS = (0.5, 0.35, 0.25, 0.15, 0.08)
 """Lengths of lines that are tried, as shares of the arm's reach, the longest first."""
-LINE_DIRECTIONS = ((0, 1, 0), (1, 0, 0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1))
+LINE_DIRECTIONS = (
+    (0, 1, 0),
+    (1, 0, 0),
+    (0, 0, 1),
+    (1, 1, 0),
+    (1, -1, 0),
+    (1, 0, 1),
+    (1, 0, -1),
+    (0, 1, 1),
+    (0, 1, -1),
+)
 """Directions that are tried, world."""
 PREFERRED_CONFIGURATIONS = ("nominal", "ready", "home")
 """Names of the configurations that lines are looked for at first."""
@@ -71,14 +81,18 @@ def branches(arm: Arm, q: Array) -> Branches:
     if fit is None:
         solutions = _iterative_solutions(arm, T, q)
         names = tuple(f"solution {k}" for k in range(1, len(solutions) + 1))
-        return Branches(solutions, names, float(np.abs(arm.fk(solutions) - T).max()), closed_form=False)
+        return Branches(
+            solutions, names, float(np.abs(arm.fk(solutions) - T).max()), closed_form=False
+        )
     result = arm.ik(T, seed=q)
     solutions = result.q[result.valid]
     names = tuple(name for name, valid in zip(result.branches, result.valid, strict=True) if valid)
     errors = np.abs(arm.fk(solutions) - T)
     if len(fit.coordinates) < 6:
         errors = errors[:, :3, 3]
-    return Branches(solutions, names, float(errors.max()) if "x" in fit.coordinates else None, closed_form=True)
+    return Branches(
+        solutions, names, float(errors.max()) if "x" in fit.coordinates else None, closed_form=True
+    )
 
 
 def straight_line(arm: Arm) -> Line | None:
@@ -104,7 +118,9 @@ def _starts(arm: Arm) -> Iterator[Array]:
     numbers = arm.description.numbers
     named = dict(arm.configurations)
     preferred = PREFERRED_CONFIGURATIONS
-    for name in sorted(named, key=lambda name: preferred.index(name) if name in preferred else len(preferred)):
+    for name in sorted(
+        named, key=lambda name: preferred.index(name) if name in preferred else len(preferred)
+    ):
         if np.all((named[name] >= numbers.lower) & (named[name] <= numbers.upper)):
             yield named[name]
     room = np.where(numbers.prismatic, arm.description.reach / 2, np.pi / 2)
@@ -163,6 +179,8 @@ def _iterative_solutions(arm: Arm, T: Array, q: Array) -> Array:
     solutions = arm.ik_numeric(np.broadcast_to(T, (ITERATION_STARTS, 4, 4)), starts)
     kept = [q]
     for other in solutions.q[solutions.valid]:
-        if len(kept) < MAX_SOLUTIONS and all(np.abs(other - known).max() > SAME_SOLUTION for known in kept):
+        if len(kept) < MAX_SOLUTIONS and all(
+            np.abs(other - known).max() > SAME_SOLUTION for known in kept
+        ):
             kept.append(other)
     return np.stack(kept)

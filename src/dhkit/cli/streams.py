@@ -16,7 +16,9 @@ import unicodedata
 from pathlib import Path
 from typing import Any, TextIO, cast
 
-PLAIN = dict(zip("→←↑↓−–≤≥·…′", ("->", "<-", "^", "v", "-", "-", "<=", ">=", "*", "...", "'"), strict=True))
+PLAIN = dict(
+    zip("→←↑↓−–≤≥·…′", ("->", "<-", "^", "v", "-", "-", "<=", ">=", "*", "...", "'"), strict=True)
+)
 PLAIN |= {"°": " deg", "±": "+/-", "∓": "-/+"}
 """ASCII for signs whose decomposition has no ASCII letters."""
 

@@ -16,4 +16,6 @@ def angle_key(name: str, *, degrees: bool) -> str:
 def joint_entry(arm: Arm, name: str, values: Array, *, degrees: bool = False) -> dict[str, object]:
     """Return joint values, shape (..., n), under a key with the unit of angles; prismatic joints stay in m."""
     in_degrees = ~arm.description.numbers.prismatic & degrees
-    return {angle_key(name, degrees=degrees): np.where(in_degrees, np.degrees(values), values).tolist()}
+    return {
+        angle_key(name, degrees=degrees): np.where(in_degrees, np.degrees(values), values).tolist()
+    }

@@ -18,7 +18,14 @@ from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm, read_arm
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
-from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check as score, protect_from_children
+from dhkit.programs import (
+    CheckRubric,
+    Limits,
+    Program,
+    ProgramError,
+    check as score,
+    protect_from_children,
+)
 from dhkit.verification import VerificationReport, verify_urdf
 
 app = typer.Typer(rich_markup_mode=None)
@@ -27,15 +34,28 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def verify(
     robot: Robot,
-    samples: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of random states.")] = 1000,
+    samples: Annotated[
+        int, typer.Option(min=1, max=1_000_000, help="Number of random states.")
+    ] = 1000,
     seed: Seed = 0,
-    urdf: Annotated[str | None, typer.Option(help="A URDF to compare with the robot's table.")] = None,
-    base: Annotated[str | None, typer.Option(help="Link of that URDF that is the world; default: the root.")] = None,
-    tip: Annotated[
-        str | None, typer.Option(help="Link of that URDF that is the tool; default: the end of the only chain.")
+    urdf: Annotated[
+        str | None, typer.Option(help="A URDF to compare with the robot's table.")
     ] = None,
-    tolerance: Annotated[float, typer.Option(help="Largest error that counts as agreement, with --urdf.")] = 1e-9,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")] = None,
+    base: Annotated[
+        str | None, typer.Option(help="Link of that URDF that is the world; default: the root.")
+    ] = None,
+    tip: Annotated[
+        str | None,
+        typer.Option(
+            help="Link of that URDF that is the tool; default: the end of the only chain."
+        ),
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(help="Largest error that counts as agreement, with --urdf.")
+    ] = 1e-9,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write a report: .md, .tex or .json.")
+    ] = None,
     uniform: Uniform = False,
     json: Json = False,
 ) -> ExitStatus:
@@ -73,16 +93,30 @@ def check(
     robot: Robot,
     program: Annotated[
         list[str],
-        typer.Argument(help="A file (.py, .m) that defines fk, ik or controller; with --run a program, its arguments."),
+        typer.Argument(
+            help="A file (.py, .m) that defines fk, ik or controller; with --run a program, its arguments."
+        ),
     ],
     run: Annotated[
-        bool, typer.Option("--run", help="Execute PROGRAM, which speaks the protocol of docs/own-code.md.")
+        bool,
+        typer.Option(
+            "--run", help="Execute PROGRAM, which speaks the protocol of docs/own-code.md."
+        ),
     ] = False,
-    rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the parts (.toml).")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")] = None,
-    samples: Annotated[int, typer.Option(min=1, max=100_000, help="Number of random states.")] = 200,
+    rubric: Annotated[
+        Path | None, typer.Option(help="Rubric: points of the parts (.toml).")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(min=1, max=100_000, help="Number of random states.")
+    ] = 200,
     seconds: Annotated[
-        float, typer.Option(min=0.01, max=3600, help="Processor time of a call, s; four times as long on the clock.")
+        float,
+        typer.Option(
+            min=0.01, max=3600, help="Processor time of a call, s; four times as long on the clock."
+        ),
     ] = 5.0,
     isolated: Isolated = False,
     json: Json = False,
@@ -92,7 +126,9 @@ def check(
     Exit status 0: full marks; 1: fewer; 2: it cannot be loaded.
     """
     if not run and len(program) != 1:
-        raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
+        raise DescriptionError(
+            f"{len(program)} files; expected one, or --run with a program and its arguments"
+        )
     arm = read_arm(robot)
     source = program if run else Path(program[0])
     protect_from_children()
@@ -107,7 +143,9 @@ def check(
             if json:
                 print_json({"error": str(error), "line": error.line, "output": output[-2000:]})
             else:
-                line = str(error) if str(error).startswith(f"{source}") else f"{loaded.name}: {error}"
+                line = (
+                    str(error) if str(error).startswith(f"{source}") else f"{loaded.name}: {error}"
+                )
                 sys.stderr.write(f"dhkit: {line}{os.linesep}")
             return ExitStatus.UNUSABLE
     if json:

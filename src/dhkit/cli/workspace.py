@@ -29,9 +29,13 @@ app = typer.Typer(rich_markup_mode=None)
 @app.command()
 def workspace(
     robot: Robot,
-    samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Number of random states.")] = 100_000,
+    samples: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="Number of random states.")
+    ] = 100_000,
     seed: Seed = 0,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
@@ -42,7 +46,10 @@ def workspace(
     with ProgressBar("sampling") as bar:
         space = sample(arm.description, samples, seed, progress=bar.show)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [write_figure(plot(space), folder / "workspace.png"), _page(arm, space, folder / "workspace.html")]
+    files = [
+        write_figure(plot(space), folder / "workspace.png"),
+        _page(arm, space, folder / "workspace.html"),
+    ]
     if json:
         print_json(_facts(arm, space) | {"files": [str(file) for file in files]})
         return
@@ -55,14 +62,22 @@ def _print(arm: Arm, space: Workspace) -> None:
     say(f"{arm.name}: what {space.samples} random states reach", "bold")
     for note in space.assumed:
         say(f"assumed: {note}", "yellow")
-    rows = [("distance from frame 0 [m]", *space.distances), ("distance from axis 1 [m]", *space.radii)]
-    rows += [(f"{axis} [m]", *span) for axis, span in zip("xyz", space.bounds.T.tolist(), strict=True)]
+    rows = [
+        ("distance from frame 0 [m]", *space.distances),
+        ("distance from axis 1 [m]", *space.radii),
+    ]
+    rows += [
+        (f"{axis} [m]", *span) for axis, span in zip("xyz", space.bounds.T.tolist(), strict=True)
+    ]
     say("")
     print_table(
-        ("tool", "least", "most"), [(name, f"{low + 0.0:.4f}", f"{high + 0.0:.4f}") for name, low, high in rows]
+        ("tool", "least", "most"),
+        [(name, f"{low + 0.0:.4f}", f"{high + 0.0:.4f}") for name, low, high in rows],
     )
     say(f"\n{_size(space)}")
-    shares = ", ".join(f"{w:.4g} ({100 * q:.0f} %)" for q, w in zip(QUANTILES, _quantiles(space), strict=True))
+    shares = ", ".join(
+        f"{w:.4g} ({100 * q:.0f} %)" for q, w in zip(QUANTILES, _quantiles(space), strict=True)
+    )
     say(f"manipulability (translational, SI): {shares}")
     q = ", ".join(_value(arm, i, x) for i, x in enumerate(space.best))
     place = ", ".join(f"{x + 0.0:.4f}" for x in arm.fk(space.best)[:3, 3])
@@ -83,10 +98,16 @@ def _singularities(arm: Arm) -> Singularities | None:
 
 def _size(space: Workspace) -> str:
     if space.estimate is None or space.grid is None:
-        extent = "one point" if space.grid is None else ("one point", "a curve", "a curved surface")[space.freedoms]
+        extent = (
+            "one point"
+            if space.grid is None
+            else ("one point", "a curve", "a curved surface")[space.freedoms]
+        )
         return f"the tool keeps to {extent}, which has no volume"
     kind = ("length", "area", "volume")[space.estimate.dimension - 1]
-    return f"{kind} reached: about {space.estimate}, an estimate by cells of {space.grid.edge:.3g} m"
+    return (
+        f"{kind} reached: about {space.estimate}, an estimate by cells of {space.grid.edge:.3g} m"
+    )
 
 
 def _quantiles(space: Workspace) -> list[float]:
@@ -111,8 +132,12 @@ def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
         "radii_m": list(space.radii),
         "bounds_m": space.bounds.tolist(),
         "freedoms": space.freedoms,
-        "estimate": None if estimate is None else vars(estimate) | {"edge_m": space.grid and space.grid.edge},
-        "manipulability": {f"{q:.0%}": w for q, w in zip(QUANTILES, _quantiles(space), strict=True)},
+        "estimate": None
+        if estimate is None
+        else vars(estimate) | {"edge_m": space.grid and space.grid.edge},
+        "manipulability": {
+            f"{q:.0%}": w for q, w in zip(QUANTILES, _quantiles(space), strict=True)
+        },
         "best": {
             "manipulability": float(space.manipulability.max()),
             **joint_entry(arm, "q", space.best),
@@ -126,7 +151,11 @@ def _singular_facts(found: Singularities) -> dict[str, Any]:
     """Return the joint of each kind of singularity, from 1, its singular values, rad or m, and its description."""
     joints = {kind: None if joint is None else joint + 1 for kind, joint in found.joints.items()}
     return {
-        kind: {"joint": joints[kind], "values_rad": list(found.values[kind]), "words": found.words[kind]}
+        kind: {
+            "joint": joints[kind],
+            "values_rad": list(found.values[kind]),
+            "words": found.words[kind],
+        }
         for kind in found.kinds
     }
 
@@ -141,7 +170,9 @@ def _page(arm: Arm, space: Workspace, path: Path) -> Path:
         view.points(space.positions[shown], heat_colors(space.manipulability[shown]))
         view.ellipsoid(velocity_ellipsoid(arm.description, first_configuration(arm.description)))
         view.save_html(
-            path, interactive=True, caption="Points that the tool reaches; brighter: it moves more easily there."
+            path,
+            interactive=True,
+            caption="Points that the tool reaches; brighter: it moves more easily there.",
         )
     return path
 

@@ -7,7 +7,12 @@ from dhkit.control.comparison import CONTROLLERS, Comparison, compare, make_cont
 from dhkit.control.controller import ContinuousController, Controller
 from dhkit.control.joint_controllers import PID
 from dhkit.control.linear import LQR, linearize
-from dhkit.control.model_controllers import ComputedTorque, FeedForward, FrictionCompensation, PDGravity
+from dhkit.control.model_controllers import (
+    ComputedTorque,
+    FeedForward,
+    FrictionCompensation,
+    PDGravity,
+)
 from dhkit.control.operational_space import OperationalSpace
 from dhkit.control.options import BatchOptions, SimulationOptions
 from dhkit.control.plant import Plant

@@ -89,7 +89,9 @@ class Adaptive:
         self._columns = list(grouping.columns)
         self.adaptation = _adaptation_gains(adaptation, len(grouping))
         if estimate is None:
-            self._start: Array = positive(masses, "masses") * (grouping.matrix @ inertial_parameters(self.description))
+            self._start: Array = positive(masses, "masses") * (
+                grouping.matrix @ inertial_parameters(self.description)
+            )
         else:
             self._start = _first_estimate(estimate, len(grouping))
         self.reset()
@@ -137,10 +139,14 @@ class Adaptive:
         w = positive(bandwidth, "bandwidth")
         z = positive(damping, "damping")
         if z < 1:
-            raise ValueError(f"damping is {damping!r}; expected 1 or more: both poles of this controller are real")
+            raise ValueError(
+                f"damping is {damping!r}; expected 1 or more: both poles of this controller are real"
+            )
         m = effective_inertia(description, q)
         if not (m > 0).all():
-            raise DescriptionError(f"{description.name}: joint {int(np.argmin(m)) + 1} feels no inertia")
+            raise DescriptionError(
+                f"{description.name}: joint {int(np.argmin(m)) + 1} feels no inertia"
+            )
 
         # Both poles are real:  lambda = w (z - sqrt(z^2 - 1)) and kd / m = w (z + sqrt(z^2 - 1)), with product w^2.
         apart = np.sqrt(z * z - 1)
@@ -174,12 +180,16 @@ class Adaptive:
         """Return the estimate at the start, shape (m,), which does not depend on q."""
         return self._start.copy()
 
-    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
+    def continuous(
+        self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
+    ) -> tuple[Array, Array]:
         """Return the torques, shape (n,), and the rate of the estimate, shape (m,), at an estimate ``state`` (m,)."""
         Y, known, s = self._terms(q, qd, setpoint)
         return Y @ state + known, self.adaptation @ (Y.T @ s)
 
-    def lyapunov(self, q: Array, qd: Array, setpoint: Setpoint, estimate: Array, true: Array) -> float:
+    def lyapunov(
+        self, q: Array, qd: Array, setpoint: Setpoint, estimate: Array, true: Array
+    ) -> float:
         """Return V = (s^T M s + (p - p*)^T Gamma^-1 (p - p*)) / 2, J: it never rises under :meth:`continuous`.
 
         Parameters
@@ -220,7 +230,9 @@ class Adaptive:
 def _inverse_excitation(description: Description, kd: Array) -> Array:
     """Return <Y^T K_D^-1 Y>^-1 over random motions, shape (m, m)."""
     q, qd, qdd = random_motions(description, RANDOM_STATES)
-    Y = velocity_regressor(description, q, qd, qd, qdd)[..., list(parameter_grouping(description).columns)]
+    Y = velocity_regressor(description, q, qd, qd, qdd)[
+        ..., list(parameter_grouping(description).columns)
+    ]
 
     # The rows of K_D^(-1/2) Y of all N states, over sqrt(N), make a matrix A with A^T A = <Y^T K_D^-1 Y>.
     A = (Y / np.sqrt(kd)[:, None]).reshape(-1, Y.shape[-1]) / np.sqrt(len(q))
@@ -236,7 +248,9 @@ def _inverse_excitation(description: Description, kd: Array) -> Array:
 def _adaptation_gains(value: ArrayLike, m: int) -> Array:
     array = number_array(value, "adaptation", "a number, (m,) or (m, m)")
     if array.shape not in ((), (m,), (m, m)) or not np.isfinite(array).all():
-        raise ValueError(f"adaptation has shape {array.shape}; expected a number, ({m},) or ({m}, {m}), finite")
+        raise ValueError(
+            f"adaptation has shape {array.shape}; expected a number, ({m},) or ({m}, {m}), finite"
+        )
     matrix = array if array.ndim == 2 else np.diag(np.broadcast_to(array, m))
     if not np.allclose(matrix, matrix.T) or np.linalg.eigvalsh(matrix).min() <= 0:
         raise ValueError("adaptation is not symmetric and positive definite")
@@ -246,5 +260,7 @@ def _adaptation_gains(value: ArrayLike, m: int) -> Array:
 def _first_estimate(value: ArrayLike, m: int) -> Array:
     array = number_array(value, "estimate", f"({m},)")
     if array.shape != (m,) or not np.isfinite(array).all():
-        raise ValueError(f"estimate has shape {array.shape}; expected ({m},) finite base parameters")
+        raise ValueError(
+            f"estimate has shape {array.shape}; expected ({m},) finite base parameters"
+        )
     return array.copy()

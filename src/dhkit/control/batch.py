@@ -15,7 +15,13 @@ from dhkit.control.options import BatchKeywords, BatchOptions
 from dhkit.control.plant import Plant
 from dhkit.control.references import Reference, reference_of
 from dhkit.control.step_kernel import StepKernel
-from dhkit.control.timing import require_positive, row_times, sampled_reference, steps_a_period, substeps
+from dhkit.control.timing import (
+    require_positive,
+    row_times,
+    sampled_reference,
+    steps_a_period,
+    substeps,
+)
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.dynamics import Friction
 from dhkit.trajectories import Trajectory
@@ -84,7 +90,9 @@ def simulate_batch(
     sensors = chosen.sensors
     if not getattr(controller, "batches", True):
         name = type(controller).__name__
-        raise ValueError(f"{name} controls one arm at a time; expected another controller, or simulate() for each arm")
+        raise ValueError(
+            f"{name} controls one arm at a time; expected another controller, or simulate() for each arm"
+        )
     require_fits(controller, description)
     require_positive(duration=duration)
     moving = chosen.moving(description)
@@ -100,31 +108,45 @@ def simulate_batch(
         array = np.asarray(0.0 if given is None else given)
         # Four arms of four joints whose last holds 0 0 0 1 would look like this too.
         if array.shape == (4, 4) and np.array_equal(array[3], [0, 0, 0, 1]):
-            raise ValueError(f"{name} looks like a pose of the tool; a batch holds joint values, ({n},) or (B, {n})")
+            raise ValueError(
+                f"{name} looks like a pose of the tool; a batch holds joint values, ({n},) or (B, {n})"
+            )
         held = _states(description, given, np.zeros(n), name)
         t = row_times(None, duration, rate)
         setpoints = held[None], np.zeros((1, *held.shape)), np.zeros((1, *held.shape))
     q = _states(description, q0, setpoints[0][0], "q0")
     qd = _states(description, qd0, setpoints[1][0], "qd0")
     size = _size(
-        q, qd, setpoints[0][0], np.empty((len(moving), n)), np.empty((*getattr(controller, "batch_shape", ()), n))
+        q,
+        qd,
+        setpoints[0][0],
+        np.empty((len(moving), n)),
+        np.empty((*getattr(controller, "batch_shape", ()), n)),
     )
     # q, qd, applied and commanded torques, of 8 bytes each.
     if keep == "all" and (needed := 4 * 8 * size * len(t) * n) > MAX_STORED_BYTES:
-        raise ValueError(f"all states are {needed / 1e9:.3g} GB; expected at most {MAX_STORED_BYTES / 1e9:g} GB")
+        raise ValueError(
+            f"all states are {needed / 1e9:.3g} GB; expected at most {MAX_STORED_BYTES / 1e9:g} GB"
+        )
     different_arms = {id(arm): arm for arm in moving}.values()
     stiffness = max(Plant(arm, friction, None).stiffness for arm in different_arms)
     steps = substeps(stiffness, 1 / rate, steps_a_period(rate, chosen.plant_rate, len(t)))
     h = 1 / rate / steps  # length of a step, s
     effort = np.stack([arm.numbers.effort for arm in moving])
     if len(setpoints[0]) == 1:
-        setpoints = _rows(setpoints[0][0], size)[None], np.zeros((1, size, n)), np.zeros((1, size, n))
+        setpoints = (
+            _rows(setpoints[0][0], size)[None],
+            np.zeros((1, size, n)),
+            np.zeros((1, size, n)),
+        )
     for array in setpoints:
         array.flags.writeable = False
     effort_limits = effort if chosen.saturation else np.full((1, n), np.inf)
     # A law in the step sees the true state, not what sensors measure.
     law = law_of(controller) if sensors is None else None
-    step_with_law = None if law is None else closed_step(moving, friction, h, law, effort_limits, setpoints)
+    step_with_law = (
+        None if law is None else closed_step(moving, friction, h, law, effort_limits, setpoints)
+    )
     run = BatchRun(
         description=description,
         controller=controller,
@@ -144,7 +166,11 @@ def simulate_batch(
 
 
 def _result(
-    run: BatchRun, record: Record, arms: tuple[Description, ...], friction: Friction | None, keep: str
+    run: BatchRun,
+    record: Record,
+    arms: tuple[Description, ...],
+    friction: Friction | None,
+    keep: str,
 ) -> BatchResult:
     """Return the result of a run from its record; ``arms`` are those that moved."""
     size, n = record.q.shape
@@ -166,7 +192,9 @@ def _result(
         rms_error=np.sqrt(record.squares / rows) if has_norms else None,
         saturated=record.saturated_steps / rows if has_norms else None,
         # NaN is outside.
-        outside=np.any(~((record.lowest >= lower) & (record.highest <= upper)), axis=1) if has_norms else None,
+        outside=np.any(~((record.lowest >= lower) & (record.highest <= upper)), axis=1)
+        if has_norms
+        else None,
         works=record.works,
         history=History(*record.rows, *reference) if keep == "all" else None,
     )

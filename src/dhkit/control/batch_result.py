@@ -78,7 +78,10 @@ class BatchResult:
     def audit(self, index: int) -> EnergyAudit:
         """Return the energy balance of one run."""
         arm = self.arm(index)
-        q, qd = (np.stack([first[index], last[index]]) for first, last in ((self.q0, self.q), (self.qd0, self.qd)))
+        q, qd = (
+            np.stack([first[index], last[index]])
+            for first, last in ((self.q0, self.q), (self.qd0, self.qd))
+        )
         kinetic = kinetic_energy(arm, q, qd)
         energy = kinetic + potential_energy(arm, q)
         drives, turnover, friction = self.works[index].tolist()
@@ -109,13 +112,17 @@ class BatchResult:
             raise IndexError(f"run {index} of {len(self)}")
         arm = self.arm(index)
         history = self.history
-        q, qd, tau, asked = (x[index] for x in (history.q, history.qd, history.tau, history.tau_asked))
+        q, qd, tau, asked = (
+            x[index] for x in (history.q, history.qd, history.tau, history.tau_asked)
+        )
         return SimulationResult(
             description=arm,
             t=self.t,
             q=q,
             qd=qd,
-            qdd=forward_dynamics(arm, q, qd, tau, friction=False if self.friction is None else self.friction),
+            qdd=forward_dynamics(
+                arm, q, qd, tau, friction=False if self.friction is None else self.friction
+            ),
             tau=tau,
             tau_asked=asked,
             reference_q=np.array(history.reference_q[index]),
@@ -137,7 +144,19 @@ class BatchResult:
         path = Path(path)
         if path.suffix.lower() != ".npz":
             raise ValueError(f"{path}: found suffix {path.suffix!r}; expected .npz")
-        names = ("t", "q0", "qd0", "q", "qd", "final_error", "peak_error", "rms_error", "saturated", "outside", "works")
+        names = (
+            "t",
+            "q0",
+            "qd0",
+            "q",
+            "qd",
+            "final_error",
+            "peak_error",
+            "rms_error",
+            "saturated",
+            "outside",
+            "works",
+        )
         arrays = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         if self.history is not None:
             arrays |= {f"history_{name}": value for name, value in vars(self.history).items()}
@@ -151,19 +170,35 @@ class BatchResult:
         unit = joint_unit(self.arms[0].numbers.prismatic)
         if self.peak_error is not None:
             summary.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
-        return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*summary, *self._remarks]))
+        return repr_line(
+            "BatchResult",
+            f"{len(self)} x {self.arms[0].name}",
+            ", ".join([*summary, *self._remarks]),
+        )
 
     def _repr_html_(self) -> str:
-        known = {"peak error": self.peak_error, "RMS": self.rms_error, "at the end": self.final_error}
-        columns = {name: np.abs(values[~self.failed]) for name, values in known.items() if values is not None}
+        known = {
+            "peak error": self.peak_error,
+            "RMS": self.rms_error,
+            "at the end": self.final_error,
+        }
+        columns = {
+            name: np.abs(values[~self.failed])
+            for name, values in known.items()
+            if values is not None
+        }
         rows = []
         for i, joint in enumerate(self.arms[0].joints):
             largest = [f"{np.max(values[:, i], initial=0.0):.3g}" for values in columns.values()]
             rows.append((joint.name, *largest, joint_unit([not joint.is_revolute])))
         headings = ("joint", *columns, "")
         align = "l" + "r" * len(columns) + "l"
-        title = f"{len(self)} x {self.arms[0].name}: {', '.join([span_text(self.t), *self._remarks])}"
-        return html_block(title, html_table(headings, rows, "Largest of all runs that did not fail", align))
+        title = (
+            f"{len(self)} x {self.arms[0].name}: {', '.join([span_text(self.t), *self._remarks])}"
+        )
+        return html_block(
+            title, html_table(headings, rows, "Largest of all runs that did not fail", align)
+        )
 
     @property
     def _remarks(self) -> list[str]:

@@ -57,11 +57,25 @@ class Record:
         peak, squares, saturated_steps = (np.zeros_like(q) for _ in range(3))
         rows = tuple(np.empty((len(q), kept, q.shape[1])) for _ in range(4 if kept else 0))
         works = np.zeros((len(q), len(WORKS)))
-        return cls(q, qd, q.copy(), qd.copy(), works, peak, squares, saturated_steps, q.copy(), q.copy(), rows)
+        return cls(
+            q,
+            qd,
+            q.copy(),
+            qd.copy(),
+            works,
+            peak,
+            squares,
+            saturated_steps,
+            q.copy(),
+            q.copy(),
+            rows,
+        )
 
     def part(self, rows: slice) -> Record:
         """Return the record of some of the arms, as views."""
-        arrays = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__ if name != "rows"}
+        arrays = {
+            name: getattr(self, name)[rows] for name in self.__dataclass_fields__ if name != "rows"
+        }
         return Record(**arrays, rows=tuple(x[rows] for x in self.rows))
 
 
@@ -120,7 +134,9 @@ class BatchRun:
 
         def advance(share: range) -> None:
             for k in share:
-                self._of_rows(blocks[k], size)._run(record.part(blocks[k]), 1, partial(report_step, k))
+                self._of_rows(blocks[k], size)._run(
+                    record.part(blocks[k]), 1, partial(report_step, k)
+                )
 
         workers = min(threads, count)
         all_in_threads(advance, [range(i, count, workers) for i in range(workers)])
@@ -134,7 +150,9 @@ class BatchRun:
         return replace(
             self,
             reference=reference,
-            effort_limits=self.effort_limits if len(self.effort_limits) != size else self.effort_limits[rows],
+            effort_limits=self.effort_limits
+            if len(self.effort_limits) != size
+            else self.effort_limits[rows],
             open_step=self.open_step.rows(rows),
             closed_step=closed,
         )
@@ -152,7 +170,11 @@ class BatchRun:
                 later = _empty_like(states)
                 commanded = np.empty_like(states[0])
                 closed(states, setpoints[min(k, len(setpoints) - 1)], (*later, commanded), threads)
-            applied = self._saturate(commanded) if closed is None or self.measured or self.substeps > 1 else commanded
+            applied = (
+                self._saturate(commanded)
+                if closed is None or self.measured or self.substeps > 1
+                else commanded
+            )
             if self.measured:
                 self._record_errors(record, k, states[0], commanded, applied)
             for row, value in zip(record.rows, (*states[:2], applied, commanded), strict=False):
@@ -173,7 +195,9 @@ class BatchRun:
             kept[:] = value
 
     def _setpoint(self, k: int) -> Setpoint:
-        return Setpoint(self.description, *(array[min(k, len(array) - 1)] for array in self.reference))
+        return Setpoint(
+            self.description, *(array[min(k, len(array) - 1)] for array in self.reference)
+        )
 
     def _commanded(self, k: int, q: Array, qd: Array) -> Array:
         """Return the torques that the controller commands in row k, shape (B, n), N m and N."""
@@ -187,7 +211,9 @@ class BatchRun:
             measured_state = self.measuring(q, qd)
         returned = call_controller(self.controller, time, *measured_state, self._setpoint(k))
         try:
-            commanded = np.ascontiguousarray(np.broadcast_to(number_array(returned, "torques", "(N, n)"), q.shape))
+            commanded = np.ascontiguousarray(
+                np.broadcast_to(number_array(returned, "torques", "(N, n)"), q.shape)
+            )
         except (TypeError, ValueError):
             raise SimulationError(
                 f"the controller returned {type(returned).__name__} of shape {np.shape(returned)} at {time:g} s;"
@@ -198,7 +224,9 @@ class BatchRun:
             wrong = ~np.isfinite(commanded).all(axis=1) & is_bounded
             if wrong.any():
                 run = int(np.argmax(wrong))
-                raise SimulationError(f"the controller's torques of run {run} are not finite at {time:g} s")
+                raise SimulationError(
+                    f"the controller's torques of run {run} are not finite at {time:g} s"
+                )
         return commanded
 
     def _saturate(self, commanded: Array) -> Array:
@@ -207,7 +235,9 @@ class BatchRun:
             return commanded
         return np.clip(commanded, -self.effort_limits, self.effort_limits)
 
-    def _record_errors(self, record: Record, k: int, q: Array, commanded: Array, applied: Array) -> None:
+    def _record_errors(
+        self, record: Record, k: int, q: Array, commanded: Array, applied: Array
+    ) -> None:
         error = self._setpoint(k).q - q
         record.squares[:] += error * error
         np.abs(error, out=error)
@@ -224,14 +254,28 @@ def _empty_like(states: tuple[Array, Array, Array]) -> tuple[Array, Array, Array
 
 
 def closed_step(
-    arms: Sequence[Description], friction: Friction | None, h: float, law: Law, effort_limits: Array, reference: Samples
+    arms: Sequence[Description],
+    friction: Friction | None,
+    h: float,
+    law: Law,
+    effort_limits: Array,
+    reference: Samples,
 ) -> StepKernel:
     """Return the step with a control law, for limits of torques and a reference as :class:`BatchRun` has them.
 
     Gains, limits and arms that all runs share are numbers of the program; others are one row for each run.
     """
     q = reference[0]
-    setpoint = np.zeros(3 * q.shape[-1]) if q.ndim == 2 else np.concatenate([x[0] for x in reference], axis=-1)
+    setpoint = (
+        np.zeros(3 * q.shape[-1])
+        if q.ndim == 2
+        else np.concatenate([x[0] for x in reference], axis=-1)
+    )
     return StepKernel.closed_loop(
-        arms, friction, h, law, effort_limits[0] if len(effort_limits) == 1 else effort_limits, setpoint
+        arms,
+        friction,
+        h,
+        law,
+        effort_limits[0] if len(effort_limits) == 1 else effort_limits,
+        setpoint,
     )

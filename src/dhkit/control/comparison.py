@@ -43,7 +43,11 @@ CONTROLLERS: Mapping[str, Tuned] = {
 
 
 def make_controller(
-    name: str, description: Description, bandwidth: float = 20.0, damping: float = 1.0, q: Array | None = None
+    name: str,
+    description: Description,
+    bandwidth: float = 20.0,
+    damping: float = 1.0,
+    q: Array | None = None,
 ) -> Controller:
     """Return a tuned controller by its name.
 
@@ -65,7 +69,9 @@ def make_controller(
         No such controller.
     """
     _require_known(name)
-    return CONTROLLERS[name](description, bandwidth, damping, np.zeros(description.n) if q is None else q)
+    return CONTROLLERS[name](
+        description, bandwidth, damping, np.zeros(description.n) if q is None else q
+    )
 
 
 def _require_known(name: str) -> None:
@@ -91,7 +97,14 @@ class Comparison:
             Whether errors of angles are in degrees.
         """
         unit = self._unit.replace("rad", "°") if degrees else self._unit
-        headings = ("controller", f"largest error [{unit}]", "RMS", "at the end", "tool's largest [mm]", "torque [%]")
+        headings = (
+            "controller",
+            f"largest error [{unit}]",
+            "RMS",
+            "at the end",
+            "tool's largest [mm]",
+            "torque [%]",
+        )
         return headings, [(name, *_row(result, degrees)) for name, result in self.results.items()]
 
     def table(self, style: str = "text") -> str:
@@ -120,7 +133,9 @@ class Comparison:
 
         def aligned(line: Sequence[str]) -> str:
             cells = zip(line[1:], widths[1:], strict=True)
-            return "  ".join([line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in cells)])
+            return "  ".join(
+                [line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in cells)]
+            )
 
         failed = [f"{name}: {reason}" for name, reason in self.failures.items()]
         return "\n".join([*map(aligned, lines), *failed])
@@ -129,7 +144,9 @@ class Comparison:
         return self.table()
 
     def __repr__(self) -> str:
-        peaks = {name: float(result.peak_error.max(initial=0.0)) for name, result in self.results.items()}
+        peaks = {
+            name: float(result.peak_error.max(initial=0.0)) for name, result in self.results.items()
+        }
         best = min(peaks, key=peaks.__getitem__, default=None)
         summary = [] if best is None else [f"least error {peaks[best]:.2g} {self._unit} by {best}"]
         summary += [f"{len(self.failures)} failed"] if self.failures else []
@@ -153,10 +170,17 @@ def _row(result: SimulationResult, degrees: bool) -> tuple[str, ...]:
     # Largest |tau_i| / limit_i over all joints; a joint without limit has the share 0.
     effort = result.description.numbers.effort
     share = 100 * float((np.abs(result.tau).max(axis=0) / effort).max())
-    errors = [float((scale * np.abs(x)).max()) for x in (result.peak_error, result.rms_error, result.final_error)]
+    errors = [
+        float((scale * np.abs(x)).max())
+        for x in (result.peak_error, result.rms_error, result.final_error)
+    ]
     tool = 1000 * result.tool_norms.peak
     torque = f"{share:.0f}" if np.isfinite(effort).any() else "no limit"
-    return (*(f"{error:.2g}" for error in errors), f"{tool:.0f}" if tool >= LARGE else f"{tool:.2g}", torque)
+    return (
+        *(f"{error:.2g}" for error in errors),
+        f"{tool:.0f}" if tool >= LARGE else f"{tool:.2g}",
+        torque,
+    )
 
 
 @takes_robot
@@ -215,7 +239,9 @@ def compare(
             controller: Any = given
             if isinstance(given, str):
                 controller = make_controller(given, description, bandwidth, damping, middle)
-            results[name] = simulate(description, controller, wanted, duration, q0, qd0, options=checked)
+            results[name] = simulate(
+                description, controller, wanted, duration, q0, qd0, options=checked
+            )
         except DhkitError as error:
             failures[name] = str(error)
         if done is not None:

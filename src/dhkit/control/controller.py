@@ -30,7 +30,9 @@ class ContinuousController(Protocol):
     def initial_state(self, q: Array) -> Array:
         """Return the internal states at time 0, shape (m,), for joint values q at the start, shape (n,), rad and m."""
 
-    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[ArrayLike, Array]:
+    def continuous(
+        self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
+    ) -> tuple[ArrayLike, Array]:
         """Return the torques, shape (n,), N m and N, and the derivatives of the internal states, shape (m,)."""
 
 
@@ -70,7 +72,9 @@ def require_fits(controller: object, description: Description) -> None:
     """
     own = getattr(controller, "description", None)
     if isinstance(own, Description) and own.kinds != description.kinds:
-        raise ValueError(f"the controller is one of {own.name}, joints {own.kinds}; expected {description.kinds}")
+        raise ValueError(
+            f"the controller is one of {own.name}, joints {own.kinds}; expected {description.kinds}"
+        )
 
 
 def name_of(controller: object) -> str:
@@ -129,7 +133,9 @@ def call_controller(controller: Callable[..., object], t: float, *arguments: obj
 
 def _failure(what: str, error: Exception, when: str = "") -> SimulationError:
     """Return a run's error: one line with the method of the controller and the exception that it raised."""
-    return SimulationError(f"{what} raised {type(error).__name__}{when}: {' '.join(str(error).split())}")
+    return SimulationError(
+        f"{what} raised {type(error).__name__}{when}: {' '.join(str(error).split())}"
+    )
 
 
 def torques(returned: object, n: int, t: float) -> Array:
@@ -141,13 +147,19 @@ def torques(returned: object, n: int, t: float) -> Array:
         Another shape, no numbers, or values that are not finite.
     """
     if returned is None:
-        raise SimulationError(f"the controller returned None at {t:g} s; expected ({n},) finite torques")
+        raise SimulationError(
+            f"the controller returned None at {t:g} s; expected ({n},) finite torques"
+        )
     array = np.asarray(returned)
     if array.dtype.kind not in "fiu" or isinstance(returned, np.ma.MaskedArray):
         kind = array.dtype if isinstance(returned, np.ndarray) else type(returned).__name__
-        raise SimulationError(f"the controller returned {kind} at {t:g} s; expected ({n},) finite torques")
+        raise SimulationError(
+            f"the controller returned {kind} at {t:g} s; expected ({n},) finite torques"
+        )
     tau = array.astype(float)
     if tau.shape != (n,) or not np.isfinite(tau).all():
         found = f"shape {tau.shape}" if tau.shape != (n,) else f"{tau.tolist()}"
-        raise SimulationError(f"the controller returned {found} at {t:g} s; expected ({n},) finite torques")
+        raise SimulationError(
+            f"the controller returned {found} at {t:g} s; expected ({n},) finite torques"
+        )
     return tau

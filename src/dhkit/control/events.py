@@ -25,7 +25,9 @@ EXCEEDED = 1e-9
 """Excess of a holding torque over its bound, relative to the largest torque, below which it counts as rounding."""
 
 
-def advance(plant: Plant, integrator: Integrator, state: State, end: float, phase: Phase | None = None) -> State:
+def advance(
+    plant: Plant, integrator: Integrator, state: State, end: float, phase: Phase | None = None
+) -> State:
     """Integrate to a later time, before which no push begins or ends, and return the state there.
 
     Parameters
@@ -46,21 +48,31 @@ def advance(plant: Plant, integrator: Integrator, state: State, end: float, phas
     """
     for _ in range(MAX_EVENTS_PER_STEP):
         if phase is None:
-            phase = plant.phase(state.q, state.qd, integrator.torque(state), plant.active_pushes(state.t))
+            phase = plant.phase(
+                state.q, state.qd, integrator.torque(state), plant.active_pushes(state.t)
+            )
         later = _checked_step(integrator, state, phase, end)
-        event = None if plant.has_no_events else _first_event(plant, integrator, state, later, phase)
+        event = (
+            None if plant.has_no_events else _first_event(plant, integrator, state, later, phase)
+        )
         while event is None:
             if later.t >= end:
                 return later
             # An integrator with steps of its own goes on under the same contact.
             state = later
             later = _checked_step(integrator, later, phase, end)
-            event = None if plant.has_no_events else _first_event(plant, integrator, state, later, phase)
+            event = (
+                None
+                if plant.has_no_events
+                else _first_event(plant, integrator, state, later, phase)
+            )
         state = event
         phase = None
         if state.t >= end:
             return state
-    raise SimulationError(f"more than {MAX_EVENTS_PER_STEP} impacts and stops before {end:g} s, from {state.t:g} s on")
+    raise SimulationError(
+        f"more than {MAX_EVENTS_PER_STEP} impacts and stops before {end:g} s, from {state.t:g} s on"
+    )
 
 
 def _checked_step(integrator: Integrator, state: State, phase: Phase, end: float) -> State:
@@ -90,7 +102,9 @@ class Event:
     """Returns the state right after it, of the state at its time."""
 
 
-def _first_event(plant: Plant, integrator: Integrator, state: State, later: State, phase: Phase) -> State | None:
+def _first_event(
+    plant: Plant, integrator: Integrator, state: State, later: State, phase: Phase
+) -> State | None:
     """Return the state right after the first sudden change before ``later``, or None if there is none."""
     if not phase.contact.holds.any() and not _may_have_event(plant, later, phase.contact):
         beyond = _beyond_between(plant, state, later)
@@ -98,7 +112,9 @@ def _first_event(plant: Plant, integrator: Integrator, state: State, later: Stat
             return None
         # A joint passes its stop and comes back within the step: search only until it is farthest beyond.
         farthest = integrator.step(state, phase, beyond)
-        return None if farthest.t < beyond else _first_event(plant, integrator, state, farthest, phase)
+        return (
+            None if farthest.t < beyond else _first_event(plant, integrator, state, farthest, phase)
+        )
 
     def at(t: float) -> State:
         if t == later.t:
@@ -163,12 +179,16 @@ def _crossing(measure: Measure, at: Callable[[float], State], begin: float, end:
         if value < 0:
             return inside
         if value > 0:
-            found: float = brentq(lambda t: measure(at(t)), inside, end, xtol=1e-15, rtol=4 * np.finfo(float).eps)
+            found: float = brentq(
+                lambda t: measure(at(t)), inside, end, xtol=1e-15, rtol=4 * np.finfo(float).eps
+            )
             return found
     return end
 
 
-def _possible_events(plant: Plant, integrator: Integrator, state: State, phase: Phase) -> list[Event]:
+def _possible_events(
+    plant: Plant, integrator: Integrator, state: State, phase: Phase
+) -> list[Event]:
     """Return the possible events of a contact: joints that come to rest, hit a stop, or break away."""
     # Measures, positive until the event: s_i qd_i of a joint that moves in the direction s_i, the room q_i - lower_i
     # and upper_i - q_i before stops, and the distance of holding torques from their bounds.

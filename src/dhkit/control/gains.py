@@ -32,7 +32,9 @@ def gain(value: ArrayLike, name: str, n: int | None = None) -> Array:
         array = np.repeat(array, n, axis=1)
     if array.ndim > 2 or (n is not None and array.ndim and array.shape[-1] != n):
         each = "n" if n is None else str(n)
-        raise ValueError(f"{name} has shape {array.shape}; expected a number, ({each},), or (B, {each}) for a batch")
+        raise ValueError(
+            f"{name} has shape {array.shape}; expected a number, ({each},), or (B, {each}) for a batch"
+        )
     if not (np.isfinite(array).all() and (array >= 0).all()):
         raise ValueError(f"{name} is {array.tolist()}; expected finite numbers, 0 or more")
     return array.copy()
@@ -48,7 +50,9 @@ def batch_of(*gains: Array) -> tuple[int, ...]:
     """
     sizes = {len(gain) for gain in gains if gain.ndim == 2}
     if len(sizes) > 1:
-        raise ValueError(f"gains are of batches of {', '.join(map(str, sorted(sizes)))}; expected one")
+        raise ValueError(
+            f"gains are of batches of {', '.join(map(str, sorted(sizes)))}; expected one"
+        )
     return tuple(sizes)
 
 
@@ -60,7 +64,9 @@ def positive(value: float, name: str) -> float:
     ValueError
         Not a positive, finite number.
     """
-    if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0):
+    if isinstance(value, bool) or not (
+        isinstance(value, Real) and np.isfinite(value) and value > 0
+    ):
         raise ValueError(f"{name} is {str(value)[:60]}; expected a positive number")
     return float(value)
 
@@ -78,7 +84,9 @@ def _positive_each(value: ArrayLike, name: str) -> Array:
     array = number_array(value, name, "a positive number, or one for each run")
     if array.ndim > 1 or not (np.isfinite(array).all() and (array > 0).all()):
         shown = str(array.tolist())[:60]
-        raise ValueError(f"{name} is {shown}; expected a positive number, or (B,) of them for a batch")
+        raise ValueError(
+            f"{name} is {shown}; expected a positive number, or (B,) of them for a batch"
+        )
     return array[:, None] if array.ndim else array
 
 
@@ -93,7 +101,9 @@ def effective_inertia(description: Description, q: ArrayLike | None = None) -> A
         Joint values, shape (n,), rad and m; the average over random configurations inside the limits unless given.
     """
     # M_ii is the torque for a unit acceleration of joint i while the other joints do not accelerate.
-    M = mass_matrix(description, random_motions(description, RANDOM_CONFIGURATIONS).q if q is None else q)
+    M = mass_matrix(
+        description, random_motions(description, RANDOM_CONFIGURATIONS).q if q is None else q
+    )
     diagonal: Array = np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, description.n).mean(axis=0)
     return diagonal
 
@@ -105,7 +115,9 @@ def pd_gains(bandwidth: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
     return w * w, 2 * z * w
 
 
-def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tuple[Array, Array, Array]:
+def pid_gains(
+    bandwidth: ArrayLike, damping: ArrayLike, integral: float
+) -> tuple[Array, Array, Array]:
     """Return k_p, k_i and k_d of the poles of (s + a w) (s^2 + 2 z w s + w^2), a = ``integral``; () or (B, 1)."""
     w = _positive_each(bandwidth, "bandwidth")
     z = _positive_each(damping, "damping")

@@ -92,7 +92,16 @@ class RungeKutta:
         into = (np.empty((1, len(q))), np.empty((1, len(q))), np.empty((1, 3)))
         kernel.with_length(end - state.t)((q[None], qd[None], works), self.tau[None], into)
         drives, _, friction = into[2][0].tolist()
-        return State(end, into[0][0], into[1][0], state.memory, drives, friction, state.push_work, state.impact_loss)
+        return State(
+            end,
+            into[0][0],
+            into[1][0],
+            state.memory,
+            drives,
+            friction,
+            state.push_work,
+            state.impact_loss,
+        )
 
     def _stages(self, state: State, phase: Phase, end: float) -> State:
         """Return the state at ``end`` from accelerations of the plant under an unchanged contact."""
@@ -128,12 +137,16 @@ class RungeKutta:
         drives = state.drive_work + float(tau @ (q_next - q1))
         friction = state.friction_work
         if plant.friction is not None:
-            powers = [float(v @ plant.resistance(v, phase.contact.directions)) for v in (v1, v2, v3, v4)]
+            powers = [
+                float(v @ plant.resistance(v, phase.contact.directions)) for v in (v1, v2, v3, v4)
+            ]
             friction += h * _weighted(powers)
         push = state.push_work
         if phase.pushes:
             stages = ((q1, v1), (q2, v2), (q3, v3), (q4, v4))
-            push += h * _weighted([float(v @ plant.push_torques(phase.pushes, q)) for q, v in stages])
+            push += h * _weighted(
+                [float(v @ plant.push_torques(phase.pushes, q)) for q, v in stages]
+            )
         return State(end, q_next, qd_next, state.memory, drives, friction, push, state.impact_loss)
 
 
@@ -159,7 +172,12 @@ class DormandPrince:
     """
 
     def __init__(
-        self, plant: Plant, torques: Torques, tolerance: float, edges: Sequence[float], longest: float = np.inf
+        self,
+        plant: Plant,
+        torques: Torques,
+        tolerance: float,
+        edges: Sequence[float],
+        longest: float = np.inf,
     ) -> None:
         self.plant = plant
         self.torques = torques
@@ -192,7 +210,9 @@ class DormandPrince:
             return self._passing(state, phase, end)
         solver = self._started(state, phase, end)
         self._advance(solver)
-        later = self._state(state, solver.y.copy(), end if solver.status == "finished" else float(solver.t))
+        later = self._state(
+            state, solver.y.copy(), end if solver.status == "finished" else float(solver.t)
+        )
         _hold(phase, state.q, later.q, later.qd)
         return later
 
@@ -221,7 +241,11 @@ class DormandPrince:
             q = y[:n]
             qd = y[n : 2 * n]
             tau, memory = self.torques(min(t, latest), q, qd, y[2 * n : -3])
-            friction = 0.0 if plant.friction is None else float(qd @ plant.resistance(qd, contact.directions))
+            friction = (
+                0.0
+                if plant.friction is None
+                else float(qd @ plant.resistance(qd, contact.directions))
+            )
             push = float(qd @ plant.push_torques(pushes, q)) if pushes else 0.0
             qdd = plant.constrained_accelerations(q, qd, tau, contact, pushes)
             if not np.isfinite(qdd).all():
@@ -251,7 +275,9 @@ class DormandPrince:
             message = solver.step()
         if message is not None or not np.isfinite(solver.y).all():
             self._raise_jumping_or_diverging(begin, solver.y_old if message is None else solver.y)
-            raise SimulationError(f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}")
+            raise SimulationError(
+                f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}"
+            )
         self._length = solver.h_abs
 
         # Every step adds 1, its length h takes off usual_rate h. The excess is not below 0: long steps earlier do not
@@ -334,7 +360,9 @@ class DormandPrince:
     def _state(self, before: State, y: Array, t: float) -> State:
         n = self.plant.n
         drives, friction, push = y[-3:].tolist()
-        return State(t, y[:n], y[n : 2 * n], y[2 * n : -3], drives, friction, push, before.impact_loss)
+        return State(
+            t, y[:n], y[n : 2 * n], y[2 * n : -3], drives, friction, push, before.impact_loss
+        )
 
 
 def _hold(phase: Phase, before: Array, q: Array, qd: Array) -> None:

@@ -60,7 +60,9 @@ class PID:
             raise ValueError(f"derivative is {derivative!r}; expected 'error' or 'measurement'")
         self.derivative = derivative
         self.cutoff = None if cutoff is None else positive(cutoff, "cutoff")
-        self.limit = number_array(np.inf if limit is None else limit, "limit", "a number, or one for each joint")
+        self.limit = number_array(
+            np.inf if limit is None else limit, "limit", "a number, or one for each joint"
+        )
         if not (self.limit > 0).all():
             raise ValueError(f"limit is {self.limit.tolist()}; expected positive numbers")
         self.batch_shape = batch_of(self.kp, self.ki, self.kd)
@@ -103,7 +105,14 @@ class PID:
 
         # A joint of constant inertia m has m d^3e/dt^3 + kd d^2e/dt^2 + kp de/dt + ki e = 0: gains scale with m.
         kp, ki, kd = pid_gains(bandwidth, damping, integral)
-        return cls(m * kp, m * ki, m * kd, derivative=derivative, cutoff=cutoff, limit=description.numbers.effort)
+        return cls(
+            m * kp,
+            m * ki,
+            m * kd,
+            derivative=derivative,
+            cutoff=cutoff,
+            limit=description.numbers.effort,
+        )
 
     def reset(self) -> None:
         """Set the integral, the filter and the time back to the start."""
@@ -115,7 +124,9 @@ class PID:
         """Return zeros for the integrals of the errors, rad s and m s, shape (n,), with filtered rates (2n,)."""
         return np.zeros(len(q) * (1 if self.cutoff is None else 2))
 
-    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
+    def continuous(
+        self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
+    ) -> tuple[Array, Array]:
         """Return the torques, shape (n,), N m and N, and the derivatives of ``state``, of the same shape."""
         n = len(q)
         error = setpoint.q - q
@@ -126,7 +137,9 @@ class PID:
         # The integral action fades out over the last hundredth of the torque limit: switched off at once, as in the
         # sampled controller, it would chatter at the limit. Where the error reduces the torque, it grows in full:
         #     d(integral)/dt = e min(max((limit - |tau|) / (BAND limit), 0), 1).
-        left = (self.limit - np.abs(tau)) / np.where(np.isfinite(self.limit), BAND * self.limit, 1.0)
+        left = (self.limit - np.abs(tau)) / np.where(
+            np.isfinite(self.limit), BAND * self.limit, 1.0
+        )
         growth = np.where(tau * error < 0, error, error * np.clip(left, 0.0, 1.0))
         if self.cutoff is None:
             return tau, growth
@@ -157,7 +170,9 @@ class PID:
         return tau
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, summary=gains_text(kp=self.kp, ki=self.ki, kd=self.kd))
+        return repr_line(
+            type(self).__name__, summary=gains_text(kp=self.kp, ki=self.ki, kd=self.kd)
+        )
 
     def _torques(self, error: Array, integral: Array | float, rate: Array) -> Array:
         return self.kp * error + self.ki * integral + self.kd * rate
@@ -166,4 +181,6 @@ class PID:
 def _require_joints(n: int, **gains: Array) -> None:
     for name, values in gains.items():
         if values.ndim and values.shape[-1] != n:
-            raise ValueError(f"{name} has {values.shape[-1]} gains; expected {n}, one for each joint")
+            raise ValueError(
+                f"{name} has {values.shape[-1]} gains; expected {n}, one for each joint"
+            )

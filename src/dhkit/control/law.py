@@ -66,14 +66,18 @@ class LawFunction:
             A state or setpoint of another shape.
         """
         named = ((q, "q"), (qd, "qd"), (setpoint.q, "setpoint.q"), (setpoint.qd, "setpoint.qd"))
-        states = [_checked(x, name, self._n) for x, name in (*named, (setpoint.qdd, "setpoint.qdd"))]
+        states = [
+            _checked(x, name, self._n) for x, name in (*named, (setpoint.qdd, "setpoint.qdd"))
+        ]
         return fill(self._kernel, self._parameters, [*states, gains], (self._n,))
 
 
 def _checked(x: ArrayLike, name: str, n: int) -> Array:
     array = np.asarray(x, dtype=float)
     if array.shape[-1:] != (n,):
-        raise ValueError(f"{name} has shape {array.shape}; expected ({n},), or (B, {n}) for a batch")
+        raise ValueError(
+            f"{name} has shape {array.shape}; expected ({n},), or (B, {n}) for a batch"
+        )
     return array
 
 

@@ -25,7 +25,9 @@ ACCELERATION = 200.0
 
 
 @takes_robot
-def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
+def linearize(
+    description: Description, q: ArrayLike, qd: ArrayLike | None = None
+) -> tuple[Array, Array]:
     """Return A and B of dx/dt = A x + B u near a state: x = (q, qd) minus the state, u = tau minus C qd + g there.
 
     Exact derivatives of forward dynamics by CasADi, at the torques that keep the rates (tau = C qd + g).
@@ -51,7 +53,10 @@ def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = Non
     """
     require_inertia(description)
     n = description.n
-    state = joint_vector(description, q), np.zeros(n) if qd is None else joint_vector(description, qd, "qd")
+    state = (
+        joint_vector(description, q),
+        np.zeros(n) if qd is None else joint_vector(description, qd, "qd"),
+    )
 
     # qdd = f(q, qd, tau) = M^-1 (tau - C qd - g), so that with x = (q, qd) and u = tau - tau_0, tau_0 = C qd + g there,
     #     A = [0, 1; df/dq, df/dqd],    B = [0; df/dtau] = [0; M^-1].
@@ -67,7 +72,9 @@ def _derivatives(description: Description) -> casadi.Function:
 
     state = [casadi.SX.sym(name, description.n) for name in ("q", "qd", "tau")]
     qdd = CasadiFunctions(description).forward_dynamics(*state)
-    return casadi.Function("derivatives", state, [casadi.jacobian(qdd, x) for x in state], {"cse": True})
+    return casadi.Function(
+        "derivatives", state, [casadi.jacobian(qdd, x) for x in state], {"cse": True}
+    )
 
 
 class LQR:
@@ -96,7 +103,9 @@ class LQR:
     m/s^2 while the others swing freely: the fastest poles are then slow enough for a rate of 1 kHz.
     """
 
-    def __init__(self, robot: Robot, q: ArrayLike, Q: ArrayLike | None = None, R: ArrayLike | None = None) -> None:
+    def __init__(
+        self, robot: Robot, q: ArrayLike, Q: ArrayLike | None = None, R: ArrayLike | None = None
+    ) -> None:
         from scipy.linalg import solve_continuous_are
 
         self.description = description_of(robot)
@@ -106,7 +115,9 @@ class LQR:
         # Q_ii = 1 / dx_i^2 and R_ii = 1 / dtau_i^2. A torque on joint i alone accelerates it by (M^-1)_ii tau_i, and
         # M^-1 is the lower half of B.
         deviations = np.repeat([ERROR, RATE], n)
-        torques = np.minimum(self.description.numbers.effort, ACCELERATION / np.diagonal(self.B[n:]))
+        torques = np.minimum(
+            self.description.numbers.effort, ACCELERATION / np.diagonal(self.B[n:])
+        )
         self.Q = _weights(Q, 1 / deviations**2, "Q")
         self.R = _weights(R, 1 / torques**2, "R")
         if np.linalg.eigvalsh(self.Q).min() < 0 or np.linalg.eigvalsh(self.R).min() <= 0:
@@ -139,10 +150,14 @@ class LQR:
 
 def _weights(given: ArrayLike | None, default: Array, name: str) -> Array:
     size = len(default)
-    weights = number_array(default if given is None else given, name, f"({size},) or ({size}, {size})")
+    weights = number_array(
+        default if given is None else given, name, f"({size},) or ({size}, {size})"
+    )
     weights = np.diag(weights) if weights.ndim == 1 else weights
     if weights.shape != (size, size) or not np.isfinite(weights).all():
-        raise ValueError(f"{name} has shape {weights.shape}; expected ({size},) or ({size}, {size}), finite")
+        raise ValueError(
+            f"{name} has shape {weights.shape}; expected ({size},) or ({size}, {size}), finite"
+        )
     if not np.allclose(weights, weights.T):
         raise ValueError(f"{name} is not symmetric")
     return weights

@@ -28,7 +28,9 @@ REST = 1e-4
 class _Proportional:
     """Base class: gains kp and kd on the errors of joint values and rates, and the model of an arm."""
 
-    def __init__(self, robot: Robot, kp: ArrayLike | None = None, kd: ArrayLike | None = None) -> None:
+    def __init__(
+        self, robot: Robot, kp: ArrayLike | None = None, kd: ArrayLike | None = None
+    ) -> None:
         if kp is None or kd is None:
             name = type(self).__name__
             raise TypeError(f"{name} needs the gains kp and kd, which {name}.tuned(arm) computes")
@@ -40,7 +42,9 @@ class _Proportional:
         self.batch_shape = batch_of(self.kp, self.kd)
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd))
+        return repr_line(
+            type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd)
+        )
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,) or (B, n), N m and N."""
@@ -50,7 +54,10 @@ class _Proportional:
     def _gains(self) -> Array:
         """The gains kp and kd of each joint, shape (2n,) or (B, 2n)."""
         shape = (*self.batch_shape, self.description.n)
-        both = (gains if gains.shape == shape else np.broadcast_to(gains, shape) for gains in (self.kp, self.kd))
+        both = (
+            gains if gains.shape == shape else np.broadcast_to(gains, shape)
+            for gains in (self.kp, self.kd)
+        )
         return np.concatenate(tuple(both), axis=-1)
 
     @cached_property
@@ -61,7 +68,9 @@ class _Proportional:
         """Return the controller as a CasADi expression."""
         raise NotImplementedError
 
-    def _law(self, name: str, torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]) -> Law:
+    def _law(
+        self, name: str, torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]
+    ) -> Law:
         """Return the law with these torques, whose gains are kp and kd of each joint."""
         return Law(name, self.description, self._gains, torques)
 
@@ -100,7 +109,11 @@ class PDGravity(_Proportional):
 
     @classmethod
     def tuned(
-        cls, robot: Robot, bandwidth: ArrayLike = 20.0, damping: ArrayLike = 1.0, q: ArrayLike | None = None
+        cls,
+        robot: Robot,
+        bandwidth: ArrayLike = 20.0,
+        damping: ArrayLike = 1.0,
+        q: ArrayLike | None = None,
     ) -> Self:
         """Return the controller with kp = m w^2 and kd = 2 z w m, m the effective inertia of each joint.
 
@@ -177,7 +190,9 @@ class FrictionCompensation:
         Model of dry friction near rest; ``Friction(1e-4)`` unless given.
     """
 
-    def __init__(self, inner: Any, robot: Robot | None = None, friction: Friction | None = None) -> None:
+    def __init__(
+        self, inner: Any, robot: Robot | None = None, friction: Friction | None = None
+    ) -> None:
         if not callable(inner):
             raise TypeError(f"inner is {type(inner).__name__}; expected a controller")
         found = robot if robot is not None else getattr(inner, "description", None)
@@ -199,7 +214,9 @@ class FrictionCompensation:
         """Return the inner controller's internal states at time 0, shape (m,)."""
         return continuous_law(self.inner, q)[0]
 
-    def continuous(self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array) -> tuple[Array, Array]:
+    def continuous(
+        self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
+    ) -> tuple[Array, Array]:
         """Return the torques, shape (n,), N m and N, and the derivatives of the inner states, shape (m,)."""
         tau, change = continuous_law(self.inner, q)[1](t, q, qd, setpoint, state)
         return np.asarray(tau, dtype=float) + self._friction(setpoint), change
@@ -209,7 +226,11 @@ class FrictionCompensation:
         return np.asarray(self.inner(t, q, qd, setpoint), dtype=float) + self._friction(setpoint)
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, self.description.name, f"{self.friction}, around {name_of(self.inner)}")
+        return repr_line(
+            type(self).__name__,
+            self.description.name,
+            f"{self.friction}, around {name_of(self.inner)}",
+        )
 
     def _friction(self, setpoint: Setpoint) -> Array:
         # tau = tau_inner + r(qd_d), with r the torque of viscous and dry friction.

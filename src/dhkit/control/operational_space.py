@@ -85,8 +85,12 @@ class OperationalSpace:
         n = self.description.n
         self.kp = _tool_gain(kp, "kp")
         self.kd = _tool_gain(kd, "kd")
-        self.posture_kp = gain(self.kp.mean() if posture_kp is None else posture_kp, "posture_kp", n)
-        self.posture_kd = gain(self.kd.mean() if posture_kd is None else posture_kd, "posture_kd", n)
+        self.posture_kp = gain(
+            self.kp.mean() if posture_kp is None else posture_kp, "posture_kp", n
+        )
+        self.posture_kd = gain(
+            self.kd.mean() if posture_kd is None else posture_kd, "posture_kd", n
+        )
         self.threshold = positive(threshold, "threshold")
         self._rows = _rows(directions)
         length = self.description.reach or 1.0
@@ -134,7 +138,9 @@ class OperationalSpace:
         a = self._row_scale * (wanted - jacobian_dot(description, q, qd) @ qd)[self._rows]
 
         # Acceleration of the joints where the tool leaves them free.
-        a_0 = setpoint.qdd + self.posture_kd * (setpoint.qd - qd) + self.posture_kp * (setpoint.q - q)
+        a_0 = (
+            setpoint.qdd + self.posture_kd * (setpoint.qd - qd) + self.posture_kp * (setpoint.q - q)
+        )
         a_0 = a_0 / scale
 
         # With J = U S V^T the inverse of Lambda = (J M^-1 J^T)^-1 is U (S V^T M^-1 V S) U^T. Near a singular direction,
@@ -156,7 +162,9 @@ class OperationalSpace:
         return tau
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd))
+        return repr_line(
+            type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd)
+        )
 
     def _scaled(self, J: Array) -> Array:
         """Return the controlled rows of Jacobians, shape (..., k, n), with lengths divided by the reach."""
@@ -195,12 +203,16 @@ def pose_error(T: Array, goal: Array) -> Array:
 def _tool_gain(value: ArrayLike, name: str) -> Array:
     array = number_array(value, name, "a number, or (6,)")
     if array.shape not in ((), (6,)):
-        raise ValueError(f"{name} has shape {array.shape}; expected a number, or (6,): position, then rotation")
+        raise ValueError(
+            f"{name} has shape {array.shape}; expected a number, or (6,): position, then rotation"
+        )
     return gain(array, name)
 
 
 def _rows(directions: ArrayLike | None) -> NDArray[np.intp]:
     chosen = np.ones(6, dtype=bool) if directions is None else np.asarray(directions)
     if chosen.shape != (6,) or not np.isin(chosen, (0, 1)).all() or not chosen.any():
-        raise ValueError(f"directions is {directions!r}; expected six of True and False, one of them True")
+        raise ValueError(
+            f"directions is {directions!r}; expected six of True and False, one of them True"
+        )
     return np.flatnonzero(chosen)

@@ -66,13 +66,22 @@ class SimulationOptions(Options):
         _require_sampling(self.rate, self.plant_rate, self.sensors, self.saturation)
         if not isinstance(self.plant, Plant | None):
             _require_arm(self.plant)
-        has_own = self.friction or self.restitution != 0.0 or not isinstance(self.pushes, tuple) or self.pushes
+        has_own = (
+            self.friction
+            or self.restitution != 0.0
+            or not isinstance(self.pushes, tuple)
+            or self.pushes
+        )
         if isinstance(self.plant, Plant) and has_own:
-            raise ValueError("plant is a Plant, which has its own friction, restitution and pushes; expected it alone")
+            raise ValueError(
+                "plant is a Plant, which has its own friction, restitution and pushes; expected it alone"
+            )
         if self.rate is None and self.sensors is not None:
             raise ValueError("sensors measure samples; expected a rate in Hz, or no sensors")
         if self.rate is None and not TOLERANCES[0] <= self.tolerance <= TOLERANCES[1]:
-            raise ValueError(f"tolerance is {self.tolerance!r}; expected {TOLERANCES[0]:g} to {TOLERANCES[1]:g}")
+            raise ValueError(
+                f"tolerance is {self.tolerance!r}; expected {TOLERANCES[0]:g} to {TOLERANCES[1]:g}"
+            )
 
     def moving(self, description: Description) -> Plant:
         """Return the plant that moves instead of a robot.
@@ -89,7 +98,9 @@ class SimulationOptions(Options):
             arm = description if self.plant is None else description_of(self.plant)
             moved = Plant(arm, Friction.chosen(self.friction), self.restitution, pushes)
         if moved.description.kinds != description.kinds:
-            raise ValueError(f"the plant has joints {moved.description.kinds}; expected {description.kinds}")
+            raise ValueError(
+                f"the plant has joints {moved.description.kinds}; expected {description.kinds}"
+            )
         return moved
 
 
@@ -148,7 +159,9 @@ class BatchOptions(Options):
             raise ValueError(f"keep is {self.keep!r}; expected one of {', '.join(KEEP)}")
         chosen = Friction.chosen(self.friction)
         if chosen is not None and chosen.width == 0:
-            raise ValueError("a batch has no stiction; expected friction that is smooth, such as Friction(0.01)")
+            raise ValueError(
+                "a batch has no stiction; expected friction that is smooth, such as Friction(0.01)"
+            )
         check_whole("threads", self.threads, 1)
 
     def moving(self, description: Description) -> tuple[Description, ...]:
@@ -169,7 +182,11 @@ class BatchOptions(Options):
     def _arms(self) -> Sequence[Robot]:
         if self.plant is None:
             return ()
-        return (self.plant,) if isinstance(self.plant, str) or not isinstance(self.plant, Sequence) else self.plant
+        return (
+            (self.plant,)
+            if isinstance(self.plant, str) or not isinstance(self.plant, Sequence)
+            else self.plant
+        )
 
 
 class BatchKeywords(TypedDict, total=False):
@@ -190,10 +207,14 @@ def _require_arm(value: object) -> None:
     try:
         description_of(value)  # type: ignore[arg-type]  # which is what is asked
     except TypeError:
-        raise TypeError(f"plant is {type(value).__name__}; expected an arm or its description") from None
+        raise TypeError(
+            f"plant is {type(value).__name__}; expected an arm or its description"
+        ) from None
 
 
-def _require_sampling(rate: float | None, plant_rate: float | None, sensors: Sensors | None, saturation: bool) -> None:
+def _require_sampling(
+    rate: float | None, plant_rate: float | None, sensors: Sensors | None, saturation: bool
+) -> None:
     require_positive(rate=rate, plant_rate=plant_rate)
     if sensors is not None and not isinstance(sensors, Sensors):
         raise TypeError(f"sensors is {type(sensors).__name__}; expected a Sensors, or None")

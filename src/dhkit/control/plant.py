@@ -72,9 +72,13 @@ class Plant:
                 raise ValueError(f"link is {push.link}; {self.description.name} has {self.n}")
         numbers = self.description.numbers
         if self.friction is not None and not (numbers.viscous.any() or numbers.coulomb.any()):
-            log.warning("%s has no friction in its file: friction changes nothing", self.description.name)
+            log.warning(
+                "%s has no friction in its file: friction changes nothing", self.description.name
+            )
         if self.restitution is not None and not 0 <= self.restitution <= 1:
-            raise ValueError(f"restitution is {self.restitution!r}; expected 0 to 1, or None for no stops")
+            raise ValueError(
+                f"restitution is {self.restitution!r}; expected 0 to 1, or None for no stops"
+            )
         object.__setattr__(self, "_single", dynamics_kernel("forward_dynamics", self.description))
 
     @property
@@ -208,7 +212,12 @@ class Plant:
         if not at_rest.any():
             return Contact(directions, at_rest)
 
-        drive = tau + self.push_torques(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
+        drive = (
+            tau
+            + self.push_torques(pushes, q)
+            - self.resistance(qd, directions)
+            - bias(self.description, q, qd)
+        )
 
         # The joints R accelerate by w = b - A f_R, with A = (M^-1)_RR and b = (M^-1 drive)_R.
         M_inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
@@ -248,7 +257,9 @@ class Plant:
         contact = self.contact(q, qd, tau, pushes)
         return Phase(contact, pushes, self.constrained_accelerations(q, qd, tau, contact, pushes))
 
-    def holding_torques(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
+    def holding_torques(
+        self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()
+    ) -> Array:
         """Return the resisting torques of holding joints, shape (n,), N m and N; 0 for the others.
 
         They are what the equation of motion leaves over: f = net - M qdd - C qd - g.
@@ -283,7 +294,9 @@ class Plant:
 
     def __repr__(self) -> str:
         friction = "no friction" if self.friction is None else str(self.friction)
-        stops = "no stops" if self.restitution is None else f"stops of restitution {self.restitution:g}"
+        stops = (
+            "no stops" if self.restitution is None else f"stops of restitution {self.restitution:g}"
+        )
         pushes = counted(len(self.pushes), "push")
         return repr_line("Plant", self.description.name, f"{friction}, {stops}, {pushes}")
 
@@ -312,7 +325,9 @@ MAX_STALLED_ROUNDS = 10
 """Rounds without fewer violations after which Murty's rule exchanges single indices, which cannot cycle."""
 
 
-def bounded_forces(A: Array, b: Array, lower: Array, upper: Array) -> tuple[Array, NDArray[np.int8]]:
+def bounded_forces(
+    A: Array, b: Array, lower: Array, upper: Array
+) -> tuple[Array, NDArray[np.int8]]:
     """Return the resisting torques f of joints at rest, and the bound that each is at.
 
     The accelerations are w = b - A f. A joint holds (w = 0) while its torque is between the bounds; it breaks away

@@ -42,21 +42,27 @@ class Push:
         for name in ("force", "moment", "point"):
             value = number_array(getattr(self, name), name, "(3,)")
             if value.shape != (3,) or not np.isfinite(value).all():
-                raise ValueError(f"{name} is {getattr(self, name)!r}; expected three finite numbers")
+                raise ValueError(
+                    f"{name} is {getattr(self, name)!r}; expected three finite numbers"
+                )
             object.__setattr__(self, name, value)
         if self.link is not None and type(self.link) is not int:
             raise TypeError(f"link is {self.link!r}; expected a whole number, or None for the tool")
         if self.link is not None and self.link < 1:
             raise ValueError(f"link is {self.link}; expected 1 or more, or None for the tool")
         if not self.begin <= self.end:
-            raise ValueError(f"the push ends at {self.end:g} s, before it begins at {self.begin:g} s")
+            raise ValueError(
+                f"the push ends at {self.end:g} s, before it begins at {self.begin:g} s"
+            )
 
     def torque(self, description: Description, q: Array) -> Array:
         """Return the joint torques of the push at joint values q (n,), shape (n,), N m and N."""
         n = description.n
         if self.link is not None and self.link > n:
             raise ValueError(f"link is {self.link}; {description.name} has {n}")
-        force, moment, point = (np.asarray(x, dtype=float) for x in (self.force, self.moment, self.point))
+        force, moment, point = (
+            np.asarray(x, dtype=float) for x in (self.force, self.moment, self.point)
+        )
         T = frames(description, q)
         frame = forward_kinematics(description, q) if self.link is None else T[self.link]
         place = frame[:3, :3] @ point + frame[:3, 3]
@@ -69,7 +75,9 @@ class Push:
         for i, axes in enumerate(carrying(description.convention, list(T))[:moved]):
             z = axes[:3, 2]
             lever = place - axes[:3, 3]
-            tau[i] = z @ (force if description.numbers.prismatic[i] else np.cross(lever, force) + moment)
+            tau[i] = z @ (
+                force if description.numbers.prismatic[i] else np.cross(lever, force) + moment
+            )
         return tau
 
     __repr__ = value_line

@@ -47,7 +47,9 @@ class Setpoint:
         return at_rest + jacobian_dot(self.description, self.q, self.qd) @ self.qd
 
     def __repr__(self) -> str:
-        return repr_line("Setpoint", self.description.name, f"q {listed(self.q)}, qd {listed(self.qd)}")
+        return repr_line(
+            "Setpoint", self.description.name, f"q {listed(self.q)}, qd {listed(self.qd)}"
+        )
 
 
 @runtime_checkable
@@ -147,7 +149,9 @@ def _make_finite(reference: object, *names: str) -> None:
     for name in names:
         value = number_array(getattr(reference, name), name, "numbers")
         if not np.isfinite(value).all():
-            raise ValueError(f"{type(reference).__name__}: {name} is {value.tolist()}; expected finite numbers")
+            raise ValueError(
+                f"{type(reference).__name__}: {name} is {value.tolist()}; expected finite numbers"
+            )
         object.__setattr__(reference, name, value)
     shapes = [np.shape(getattr(reference, name)) for name in names]
     try:
@@ -176,7 +180,9 @@ class _Motion:
 
 
 def reference_of(
-    description: Description, reference: Reference | Trajectory | ArrayLike, q0: ArrayLike | None = None
+    description: Description,
+    reference: Reference | Trajectory | ArrayLike,
+    q0: ArrayLike | None = None,
 ) -> Reference:
     """Return a reference: as given, or made from a trajectory, or from a configuration or a pose to hold.
 

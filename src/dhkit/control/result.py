@@ -56,7 +56,9 @@ class EnergyAudit:
 
     def _repr_html_(self) -> str:
         names = ("change", "drives", "pushes", "friction", "impacts", "remains", "turnover")
-        return html_table(names, [tuple(f"{getattr(self, name):.4g}" for name in names)], "Energy [J]", align="r")
+        return html_table(
+            names, [tuple(f"{getattr(self, name):.4g}" for name in names)], "Energy [J]", align="r"
+        )
 
 
 class ErrorNorms(NamedTuple):
@@ -151,7 +153,9 @@ class SimulationResult:
         # R = T^T T_reference turns by phi about a unit vector u. Its skew entries are 2 sin(phi) u, and its trace is
         # 1 + 2 cos(phi).
         R = np.swapaxes(self.T[:, :3, :3], 1, 2) @ self.reference_T[:, :3, :3]
-        skew = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+        skew = np.stack(
+            [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
+        )
         angle: Array = np.arctan2(np.linalg.norm(skew, axis=1), np.trace(R, axis1=1, axis2=2) - 1)
         return angle
 
@@ -188,14 +192,26 @@ class SimulationResult:
         peak = self.peak_error
         rms = self.rms_error
         final = self.final_error
-        saturated = self.saturated if len(self.saturated) else np.mean(self.tau != self.tau_asked, axis=0)
+        saturated = (
+            self.saturated if len(self.saturated) else np.mean(self.tau != self.tau_asked, axis=0)
+        )
         rows = []
         for i, joint in enumerate(joints):
             errors = [f"{error[i]:.3g}" for error in (peak, rms, final)]
             unit = joint_unit([not joint.is_revolute])
-            largest_torque = f"{np.abs(self.tau[:, i]).max():.4g} {'N m' if joint.is_revolute else 'N'}"
+            largest_torque = (
+                f"{np.abs(self.tau[:, i]).max():.4g} {'N m' if joint.is_revolute else 'N'}"
+            )
             rows.append((joint.name, *errors, unit, largest_torque, f"{100 * saturated[i]:.3g} %"))
-        headings = ("joint", "largest error", "RMS", "at the end", "", "largest torque", "saturated")
+        headings = (
+            "joint",
+            "largest error",
+            "RMS",
+            "at the end",
+            "",
+            "largest torque",
+            "saturated",
+        )
         by = f" under {self.controller}" if self.controller else ""
         return html_block(
             f"{self.description.name}{by}: {span_text(self.t)}",

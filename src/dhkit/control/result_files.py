@@ -70,7 +70,9 @@ def save_result(result: SimulationResult, path: str | Path) -> Path:
     else:
         content = archive_bytes(suffix, SIMULATION.archived(result.description, values))
     if len(content) > SIMULATION.most:
-        raise ValueError(f"{path}: {len(content) / 1e6:.0f} MB; expected at most {SIMULATION.most / 1e6:g} MB")
+        raise ValueError(
+            f"{path}: {len(content) / 1e6:.0f} MB; expected at most {SIMULATION.most / 1e6:g} MB"
+        )
     write_atomically(path, content)
     return path
 
@@ -126,15 +128,24 @@ def _checked_arrays(values: Mapping[str, Any], n: int) -> dict[str, Array]:
     shapes |= dict.fromkeys(ROWS, (states, n))
     shapes |= {"t": (states,), SATURATED: (n,) if np.size(values[SATURATED]) else (0,)}
     shapes[POSES] = (states, 12) if np.size(values[POSES]) else (0, 12)
-    arrays = {name: _shaped(name, np.asarray(values[name], dtype=float), shape) for name, shape in shapes.items()}
+    arrays = {
+        name: _shaped(name, np.asarray(values[name], dtype=float), shape)
+        for name, shape in shapes.items()
+    }
     for name, array in arrays.items():
         if not np.isfinite(array).all():
-            row = f", the first in row {int(np.argwhere(~np.isfinite(array))[0, 0])}" if array.ndim else ""
+            row = (
+                f", the first in row {int(np.argwhere(~np.isfinite(array))[0, 0])}"
+                if array.ndim
+                else ""
+            )
             raise ValueError(f"{name} has values that are not finite{row}")
     t = arrays["t"]
     shares = arrays[SATURATED]
     if arrays[f"{AUDIT}turnover"] < 0:
-        raise ValueError(f"{AUDIT}turnover is {float(arrays[f'{AUDIT}turnover']):g}; expected 0 or more")
+        raise ValueError(
+            f"{AUDIT}turnover is {float(arrays[f'{AUDIT}turnover']):g}; expected 0 or more"
+        )
     if t[0] != 0:
         raise ValueError(f"t begins with {t[0]:g} s; expected 0")
     if (np.diff(t) <= 0).any():
@@ -148,7 +159,9 @@ def _checked_arrays(values: Mapping[str, Any], n: int) -> dict[str, Array]:
 def _shaped(name: str, array: Array, shape: tuple[int, ...]) -> Array:
     """Return an array in a shape from which it differs at most by axes that MATLAB adds, of length 1 or empty."""
     empty = array.size == 0 and 0 in shape
-    if not empty and [length for length in array.shape if length != 1] != [length for length in shape if length != 1]:
+    if not empty and [length for length in array.shape if length != 1] != [
+        length for length in shape if length != 1
+    ]:
         raise ValueError(f"{name} has shape {array.shape}; expected {shape}")
     return array.reshape(shape)
 
@@ -175,8 +188,12 @@ def _csv_values(text: str, n: int) -> dict[str, Any]:
     names, table = read_table(text)
     expected = _columns(n)
     if names != expected:
-        raise DescriptionError(f"columns {', '.join(names)[:80]}; expected {', '.join(expected)[:200]}")
-    values = dict(zip(ROWS, np.split(table[:, 1:], len(ROWS), axis=1), strict=True)) | {"t": table[:, 0]}
+        raise DescriptionError(
+            f"columns {', '.join(names)[:80]}; expected {', '.join(expected)[:200]}"
+        )
+    values = dict(zip(ROWS, np.split(table[:, 1:], len(ROWS), axis=1), strict=True)) | {
+        "t": table[:, 0]
+    }
     values[POSES] = np.zeros((0, 12))
     return values | _comment_values(text)
 
@@ -191,9 +208,13 @@ def _comment_values(text: str) -> dict[str, Array]:
     values = {}
     for name in (name for name in SIMULATION.arrays if name not in ("t", POSES, *ROWS)):
         if name not in stated:
-            raise DescriptionError(f"no comment '# {name}: ...'; expected a simulation that dhkit saved")
+            raise DescriptionError(
+                f"no comment '# {name}: ...'; expected a simulation that dhkit saved"
+            )
         try:
             values[name] = np.array([float(word) for word in stated[name].split()])
         except ValueError:
-            raise DescriptionError(f"{name} is {stated[name].strip()[:40]!r}; expected numbers") from None
+            raise DescriptionError(
+                f"{name} is {stated[name].strip()[:40]!r}; expected numbers"
+            ) from None
     return values

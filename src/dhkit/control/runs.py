@@ -8,7 +8,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dhkit.control.controller import Controller, call_controller, continuous_law, name_of, reset, torques
+from dhkit.control.controller import (
+    Controller,
+    call_controller,
+    continuous_law,
+    name_of,
+    reset,
+    torques,
+)
 from dhkit.control.events import advance
 from dhkit.control.integrators import DormandPrince, Integrator, RungeKutta, State
 from dhkit.control.plant import Plant
@@ -67,7 +74,9 @@ class Run(ABC):
         self.t = t
         self.reference = reference
         self.effort_limits = effort_limits
-        self.q, self.qd, self.qdd, self.tau, self.tau_asked = (np.zeros((len(t), plant.n)) for _ in range(5))
+        self.q, self.qd, self.qdd, self.tau, self.tau_asked = (
+            np.zeros((len(t), plant.n)) for _ in range(5)
+        )
         self.turnover = 0.0
 
     @abstractmethod
@@ -134,9 +143,16 @@ class Run(ABC):
     def result(self, k: int, first: State, last: State) -> SimulationResult:
         """Return the result of the rows up to k."""
         rows = slice(0, k + 1)
-        recorded = {name: getattr(self, name)[rows] for name in ("t", "q", "qd", "qdd", "tau", "tau_asked")}
-        recorded |= {"reference_q": self.reference[0][rows], "reference_qd": self.reference[1][rows]}
-        return result_of(self.description, self.plant, recorded, first, last, self.turnover, self.controller)
+        recorded = {
+            name: getattr(self, name)[rows] for name in ("t", "q", "qd", "qdd", "tau", "tau_asked")
+        }
+        recorded |= {
+            "reference_q": self.reference[0][rows],
+            "reference_qd": self.reference[1][rows],
+        }
+        return result_of(
+            self.description, self.plant, recorded, first, last, self.turnover, self.controller
+        )
 
 
 class SampledRun(Run):
@@ -165,9 +181,15 @@ class SampledRun(Run):
         if self.controller is None:
             none = np.zeros(n)
             return none, RungeKutta(self.plant, none)
-        q, qd = (state.q.copy(), state.qd.copy()) if self.measuring is None else self.measuring(state.q, state.qd)
+        q, qd = (
+            (state.q.copy(), state.qd.copy())
+            if self.measuring is None
+            else self.measuring(state.q, state.qd)
+        )
         commanded = torques(call_controller(self.controller, t, q, qd, self.setpoint(k)), n, t)
-        return commanded, RungeKutta(self.plant, np.clip(commanded, -self.effort_limits, self.effort_limits))
+        return commanded, RungeKutta(
+            self.plant, np.clip(commanded, -self.effort_limits, self.effort_limits)
+        )
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
         """Return the ends of all steps to the next row."""
@@ -192,7 +214,9 @@ class ContinuousRun(Run):
         As for :class:`Run`.
     """
 
-    def __init__(self, *others: Any, continuous_reference: Reference, q0: Array, tolerance: float) -> None:
+    def __init__(
+        self, *others: Any, continuous_reference: Reference, q0: Array, tolerance: float
+    ) -> None:
         super().__init__(*others)
         self.continuous_reference = continuous_reference
         self.memory = np.zeros(0)
@@ -202,7 +226,9 @@ class ContinuousRun(Run):
         end = float(self.t[-1])
         inside = [edge for edge in self.edges() if 0 < edge < end]
         longest = np.inf if self.plant.has_no_events and self.controller is None else LONGEST_STEP
-        self._integrator = DormandPrince(self.plant, self._torques, tolerance, [*inside, end], longest)
+        self._integrator = DormandPrince(
+            self.plant, self._torques, tolerance, [*inside, end], longest
+        )
 
     def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
         """Return the torques at a row, shape (n,), N m and N, and the integrator of the whole run."""
@@ -210,7 +236,9 @@ class ContinuousRun(Run):
 
     def edges(self) -> list[float]:
         """Return the times (s) at which pushes begin or end or the reference jumps, ascending."""
-        return sorted({*super().edges(), *(float(x) for x in getattr(self.continuous_reference, "jumps", ()))})
+        return sorted(
+            {*super().edges(), *(float(x) for x in getattr(self.continuous_reference, "jumps", ()))}
+        )
 
     def _torques(self, t: float, q: Array, qd: Array, memory: Array) -> tuple[Array, Array]:
         commanded, derivative = self._commanded(t, q, qd, memory)
@@ -224,11 +252,17 @@ class ContinuousRun(Run):
         setpoint = Setpoint(self.description, *(array[0] for array in samples))
         returned = call_controller(self._law, t, q.copy(), qd.copy(), setpoint, memory.copy())
         if not isinstance(returned, tuple) or len(returned) != len(PAIR):
-            raise SimulationError(f"the controller returned {type(returned).__name__} at {t:g} s; expected {PAIR}")
+            raise SimulationError(
+                f"the controller returned {type(returned).__name__} at {t:g} s; expected {PAIR}"
+            )
         commanded = torques(returned[0], n, t)
-        derivative = number_array(returned[1], "derivatives of the controller's states", "(m,)").reshape(-1)
+        derivative = number_array(
+            returned[1], "derivatives of the controller's states", "(m,)"
+        ).reshape(-1)
         if not np.isfinite(derivative).all():
-            raise SimulationError(f"the controller's states have derivatives that are not finite at {t:g} s")
+            raise SimulationError(
+                f"the controller's states have derivatives that are not finite at {t:g} s"
+            )
         if derivative.shape != self.memory.shape:
             raise SimulationError(
                 f"the controller's states have {derivative.size} derivatives at {t:g} s; expected {self.memory.size}"

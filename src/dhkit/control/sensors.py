@@ -97,7 +97,11 @@ class Measuring:
 
         # The difference over a period, (q_k - q_(k-1)) / period, or 0 at the first sample, which has none before it.
         if sensors.differences:
-            rate = np.zeros_like(q) if self._before is None else (measured - self._before) / self._period
+            rate = (
+                np.zeros_like(q)
+                if self._before is None
+                else (measured - self._before) / self._period
+            )
         else:
             rate = qd + np.asarray(sensors.rate_noise) * self._random.standard_normal(qd.shape)
         self._before = measured

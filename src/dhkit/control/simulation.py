@@ -15,7 +15,14 @@ from dhkit.control.plant import Plant
 from dhkit.control.references import Held, Reference, reference_of
 from dhkit.control.result import SimulationResult
 from dhkit.control.runs import ContinuousRun, SampledRun
-from dhkit.control.timing import MAX_STEPS, require_positive, row_times, sampled_reference, steps_a_period, substeps
+from dhkit.control.timing import (
+    MAX_STEPS,
+    require_positive,
+    row_times,
+    sampled_reference,
+    steps_a_period,
+    substeps,
+)
 from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.trajectories import Trajectory
@@ -88,7 +95,9 @@ def simulate(
     require_positive(duration=duration)
     t = row_times(followed.duration, duration, (plant_rate or ROWS_RATE) if rate is None else rate)
     setpoints = sampled_reference(description, followed, t)
-    effort_limits = moved.description.numbers.effort if chosen.saturation else np.full(moved.n, np.inf)
+    effort_limits = (
+        moved.description.numbers.effort if chosen.saturation else np.full(moved.n, np.inf)
+    )
     q = _state(description, q0, setpoints[0][0], "q0")
     qd = _state(description, qd0, setpoints[1][0], "qd0")
     _warn_beyond_stops(moved, setpoints[0])
@@ -97,7 +106,9 @@ def simulate(
     if rate is None:
         # DOP853's steps in stiff friction are about as long as those of a fixed step.
         substeps(moved.stiffness, t[-1] / MAX_STEPS)
-        continuous = ContinuousRun(*run_arguments, continuous_reference=followed, q0=q, tolerance=chosen.tolerance)
+        continuous = ContinuousRun(
+            *run_arguments, continuous_reference=followed, q0=q, tolerance=chosen.tolerance
+        )
         return continuous(State(0.0, q, qd, continuous.memory), chosen.progress)
     steps = substeps(moved.stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
     measuring = None if chosen.sensors is None else chosen.sensors.start(moved.n, 1 / rate)
@@ -138,7 +149,9 @@ def _moved_to_stops(plant: Plant, q: Array, name: str) -> Array:
     i = int(np.argmax((q < lower) | (q > upper)))
     joint = plant.description.joints[i]
     text = violated_limit_text(q[i], lower[i], upper[i], slides=not joint.is_revolute, digits=4)
-    raise ValueError(f"{name}: {joint.name} is {text}; expected joint values inside, or restitution=None for no stops")
+    raise ValueError(
+        f"{name}: {joint.name} is {text}; expected joint values inside, or restitution=None for no stops"
+    )
 
 
 def _state(description: Description, given: ArrayLike | None, default: Array, name: str) -> Array:

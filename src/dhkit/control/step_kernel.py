@@ -88,13 +88,19 @@ class StepKernel:
         numbers = {"setpoint": setpoint, **plant, "gains": law.gains}
         numbers["effort_limits"] = np.minimum(effort_limits, NO_LIMIT)
         model_pattern = ""
-        if list(arms) != [law.description]:  # a controller whose model is the arm that moves shares its symbols
+        if list(arms) != [
+            law.description
+        ]:  # a controller whose model is the arm that moves shares its symbols
             model_pattern, numbers["model"] = inertial_pattern(law.description)
         return cls._of(f"{pattern} {law.name} {model_pattern}", numbers, arms, law)
 
     @classmethod
     def _of(
-        cls, pattern: str, numbers: Mapping[str, Array], arms: Sequence[Description], law: Law | None
+        cls,
+        pattern: str,
+        numbers: Mapping[str, Array],
+        arms: Sequence[Description],
+        law: Law | None,
     ) -> StepKernel:
         """Return the step whose program has these inputs: shape (p,) for all runs, or (B, p)."""
         shared = {name: values for name, values in numbers.items() if values.ndim == 1}
@@ -123,9 +129,13 @@ class StepKernel:
 
     def rows(self, rows: slice) -> StepKernel:
         """Return the step of some of the runs."""
-        return replace(self, shared=self.shared.copy(), own=None if self.own is None else self.own[rows])
+        return replace(
+            self, shared=self.shared.copy(), own=None if self.own is None else self.own[rows]
+        )
 
-    def __call__(self, states: Sequence[Array], drive: Array, into: Sequence[Array], threads: int = 1) -> None:
+    def __call__(
+        self, states: Sequence[Array], drive: Array, into: Sequence[Array], threads: int = 1
+    ) -> None:
         """Write the joint values (B, n), rates (B, n) and works (B, 3) after a step, and with a law its torques (B, n).
 
         Parameters
@@ -148,7 +158,9 @@ class StepKernel:
         self.kernel(self.shared, [*states, *own], list(into), threads)
 
 
-def _plant(arms: Sequence[Description], friction: Friction | None, h: float) -> tuple[str, dict[str, Array]]:
+def _plant(
+    arms: Sequence[Description], friction: Friction | None, h: float
+) -> tuple[str, dict[str, Array]]:
     """Return the pattern of a plant's program, and its inputs by name."""
     pattern, values = inertial_pattern(*arms)
     numbers = {"step": np.array([h]), "arm": values}
@@ -158,7 +170,9 @@ def _plant(arms: Sequence[Description], friction: Friction | None, h: float) -> 
     return f"{pattern} friction", numbers | {"friction": losses[0] if len(arms) == 1 else losses}
 
 
-def _graph(arms: Sequence[Description], law: Law | None, sizes: Mapping[str, int], own: Sequence[str]) -> Graph:
+def _graph(
+    arms: Sequence[Description], law: Law | None, sizes: Mapping[str, int], own: Sequence[str]
+) -> Graph:
     """Return the program; ``sizes`` are lengths of inputs by name, ``own`` the names of each run's own inputs."""
     import casadi
 
@@ -203,7 +217,12 @@ class _After(NamedTuple):
 
 
 def _runge_kutta_step(
-    table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX, h: casadi.SX, friction: casadi.SX | None
+    table: InertialTable,
+    q: casadi.SX,
+    qd: casadi.SX,
+    tau: casadi.SX,
+    h: casadi.SX,
+    friction: casadi.SX | None,
 ) -> _After:
     """Return the state after a step of length h under constant torques.
 
@@ -214,7 +233,11 @@ def _runge_kutta_step(
 
     def derivative(x: casadi.SX, v: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
         """Return the acceleration at a state, and the power that friction takes there."""
-        resistance = casadi.SX.zeros(table.n) if friction is None else friction_torque(v, friction, smooth=True)
+        resistance = (
+            casadi.SX.zeros(table.n)
+            if friction is None
+            else friction_torque(v, friction, smooth=True)
+        )
         return recursive_forward_dynamics(table, x, v, tau - resistance), casadi.dot(v, resistance)
 
     v1 = qd

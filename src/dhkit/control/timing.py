@@ -55,9 +55,13 @@ def row_times(reference: float | None, duration: float | None, rate: float) -> A
         positive(span, "the reference's duration")
     steps = round(span * rate)
     if not steps:
-        raise ValueError(f"{span:g} s are less than half a period at {rate:g} Hz; expected a period at least")
+        raise ValueError(
+            f"{span:g} s are less than half a period at {rate:g} Hz; expected a period at least"
+        )
     if steps > MAX_STEPS:
-        raise ValueError(f"{span:g} s at {rate:g} Hz are {span * rate:.3g} steps; expected at most {MAX_STEPS:,}")
+        raise ValueError(
+            f"{span:g} s at {rate:g} Hz are {span * rate:.3g} steps; expected at most {MAX_STEPS:,}"
+        )
     # k / rate, and not k times a rounded period, so that rounding errors do not grow with k.
     return np.arange(steps + 1) / rate
 
@@ -74,7 +78,9 @@ def steps_a_period(rate: float, plant_rate: float | None, periods: int = 1) -> i
     if abs(steps - round(steps)) > 1e-9 or steps < 1 - 1e-9:
         raise ValueError(f"plant_rate is {plant_rate:g}; expected a multiple of rate, {rate:g}")
     if steps * periods > MAX_STEPS:
-        raise ValueError(f"plant_rate {plant_rate:g} makes {steps * periods:.3g} steps; expected at most {MAX_STEPS:,}")
+        raise ValueError(
+            f"plant_rate {plant_rate:g} makes {steps * periods:.3g} steps; expected at most {MAX_STEPS:,}"
+        )
     return round(steps)
 
 
@@ -119,14 +125,18 @@ def sampled_reference(description: Description, reference: Reference, t: Array) 
     try:
         found = tuple(reference.sampled(t.copy()))
     except Exception as error:
-        raise ValueError(f"the reference raised {type(error).__name__}: {' '.join(str(error).split())}") from error
+        raise ValueError(
+            f"the reference raised {type(error).__name__}: {' '.join(str(error).split())}"
+        ) from error
     if len(found) != len(NAMES):
         raise ValueError(f"the reference returned {len(found)} arrays; expected {', '.join(NAMES)}")
     copies = []
     for name, value in zip(NAMES, found, strict=True):
         array = np.asarray(value)
         if array.dtype.kind not in "fiu" or array.shape != shape or not np.isfinite(array).all():
-            raise ValueError(f"the reference's {name} has shape {array.shape}; expected {shape}, finite numbers")
+            raise ValueError(
+                f"the reference's {name} has shape {array.shape}; expected {shape}, finite numbers"
+            )
         copy = np.array(array, dtype=float)
         copy.flags.writeable = False
         copies.append(copy)

@@ -78,12 +78,19 @@ class ToolPoses:
         q = first
         for k, (T0, T1) in enumerate(pairwise(poses)):
             try:
-                motion = straight_line(description, T0, T1, q, duration=float(times[k + 1] - times[k]))
+                motion = straight_line(
+                    description, T0, T1, q, duration=float(times[k + 1] - times[k])
+                )
             except PlanningError as error:
                 raise PlanningError(f"from pose {k} to pose {k + 1}: {error}") from None
             motions.append(motion)
             q = motion.q(motion.duration)
-        for name, value in (("poses", poses), ("times", times), ("_first", first), ("_motions", tuple(motions))):
+        for name, value in (
+            ("poses", poses),
+            ("times", times),
+            ("_first", first),
+            ("_motions", tuple(motions)),
+        ):
             object.__setattr__(self, name, value)
 
     @property
@@ -94,10 +101,14 @@ class ToolPoses:
     @property
     def jumps(self) -> Array:
         """Times at which the jerk jumps, shape (jumps,), s: at the poses, and between pieces of the joints' motion."""
-        return np.concatenate([self._knots, *(self._knots[k] + m.breaks for k, m in enumerate(self._motions))])
+        return np.concatenate(
+            [self._knots, *(self._knots[k] + m.breaks for k, m in enumerate(self._motions))]
+        )
 
     def __repr__(self) -> str:
-        poses = f"{counted(len(self._knots), 'pose')} from {self._knots[0]:g} to {self.duration:g} s"
+        poses = (
+            f"{counted(len(self._knots), 'pose')} from {self._knots[0]:g} to {self.duration:g} s"
+        )
         return repr_line("ToolPoses", description_of(self.robot).name, poses)
 
     @cached_property
@@ -137,7 +148,11 @@ def joints_at_pose(description: Description, T: ArrayLike, near: Array | None, n
     """
     pose = one_pose(T, name)
     closed = classify(description).fit is not None
-    found = inverse_kinematics(description, pose, near) if closed else solve_numerically(description, pose, near)
+    found = (
+        inverse_kinematics(description, pose, near)
+        if closed
+        else solve_numerically(description, pose, near)
+    )
     try:
         return found.require(near)
     except UnreachableError as error:
@@ -154,7 +169,9 @@ def _poses(description: Description, given: ArrayLike, q0: Array | None) -> Arra
     if not positions:
         return check_pose(array, "poses").copy()
     if q0 is None:
-        raise ValueError("q0 is not given; expected joint values whose orientation of the tool the positions keep")
+        raise ValueError(
+            "q0 is not given; expected joint values whose orientation of the tool the positions keep"
+        )
     poses = np.tile(forward_kinematics(description, q0), (len(array), 1, 1))
     poses[:, :3, 3] = array
     return poses

@@ -12,7 +12,13 @@ from dhkit.description.changes import (
     with_uniform_links,
 )
 from dhkit.description.files import write_atomically
-from dhkit.description.frames import joint_array, joint_vector, link_transforms, world_to_frames, world_to_tool
+from dhkit.description.frames import (
+    joint_array,
+    joint_vector,
+    link_transforms,
+    world_to_frames,
+    world_to_tool,
+)
 from dhkit.description.library import library_robot, robots
 from dhkit.description.locking import lock
 from dhkit.description.named import Named

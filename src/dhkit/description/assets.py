@@ -26,10 +26,14 @@ def asset(name: str) -> Path:
         for root in (_PACKAGE, _CHECKOUT):
             if (root / name).exists():
                 return root / name
-    raise DescriptionError(f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl")
+    raise DescriptionError(
+        f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl"
+    )
 
 
-def inside(folder: Path | None, path: str, subject: str, root: str = "the robot's folder") -> Path | None:
+def inside(
+    folder: Path | None, path: str, subject: str, root: str = "the robot's folder"
+) -> Path | None:
     """Return the file that a relative path names inside a folder, None for an unknown folder.
 
     Parameters
@@ -56,7 +60,9 @@ def inside(folder: Path | None, path: str, subject: str, root: str = "the robot'
         or parts.is_absolute()
         or ".." in parts.parts
     ):
-        raise DescriptionError(f"{subject} is {path[:80]!r}; expected a relative path inside {root}")
+        raise DescriptionError(
+            f"{subject} is {path[:80]!r}; expected a relative path inside {root}"
+        )
     if folder is None:
         return None
     file = folder / parts

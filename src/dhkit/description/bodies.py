@@ -23,7 +23,14 @@ Vector: TypeAlias = tuple[Expression, Expression, Expression]
 """Three coordinates."""
 
 ORIGIN: Vector = (ZERO, ZERO, ZERO)
-INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}
+INERTIA_PLACES = {
+    "xx": (0, 0),
+    "yy": (1, 1),
+    "zz": (2, 2),
+    "xy": (0, 1),
+    "yz": (1, 2),
+    "xz": (0, 2),
+}
 """Row and column of each moment and product in the inertia tensor, in the order in which six of them are listed."""
 MIN_EIGENVALUE_TOLERANCE = 1e-12
 """kg m^2: the lowest eigenvalue of a published inertia may be this far below zero ..."""
@@ -84,7 +91,9 @@ class Body:
         return self.name.partition(" ")[0] == PAYLOAD
 
     def __repr__(self) -> str:
-        return repr_line("Body", self.name, f"{self.mass} kg, centre of mass {vector_text(self.com)} m")
+        return repr_line(
+            "Body", self.name, f"{self.mass} kg, centre of mass {vector_text(self.com)} m"
+        )
 
 
 def settled_vector(entries: Sequence[Expression] | ExactArray) -> Vector:
@@ -111,7 +120,10 @@ def joined(bodies: Sequence[Body]) -> Body:
     if len(bodies) == 1:
         return bodies[0]
     unphysical = any(body.unphysical for body in bodies)
-    tensor = sum((np.array(body.inertia.rows, dtype=object) for body in bodies), np.full((3, 3), ZERO, dtype=object))
+    tensor = sum(
+        (np.array(body.inertia.rows, dtype=object) for body in bodies),
+        np.full((3, 3), ZERO, dtype=object),
+    )
     heavy = [body for body in bodies if not body.mass.is_zero]
     if len(heavy) < 2:
         located = (heavy or bodies)[0]
@@ -137,7 +149,9 @@ def rod(mass: Expression, start: Vector, end: Vector) -> Body:
     """Return a thin uniform rod between two points, m: inertia m (l^2 1 - l l^T) / 12 about its middle."""
     first = np.array(start, dtype=object)
     last = np.array(end, dtype=object)
-    return Body(mass, settled_vector((first + last) / 2), _inertia(_steiner_term(last - first, mass / 12)))
+    return Body(
+        mass, settled_vector((first + last) / 2), _inertia(_steiner_term(last - first, mass / 12))
+    )
 
 
 def _steiner_term(lever: ExactArray, mass: Expression) -> ExactArray:

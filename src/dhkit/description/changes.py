@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description.arrays import Array, number_array
-from dhkit.description.bodies import ORIGIN, PAYLOAD, Body, ExactPose, Inertia, Vector, moved_body, rod
+from dhkit.description.bodies import (
+    ORIGIN,
+    PAYLOAD,
+    Body,
+    ExactPose,
+    Inertia,
+    Vector,
+    moved_body,
+    rod,
+)
 from dhkit.description.exact_poses import fixed_row, inverse, pose_of
 from dhkit.description.frames import one_each
 from dhkit.description.named import Named
@@ -57,7 +66,9 @@ def with_parameters(description: Description, /, **values: Quantity) -> Descript
     known = description.parameters
     for name in values:
         if name not in known:
-            raise DescriptionError(f"{description.name} has no parameter {name!r}; it has {', '.join(known) or 'none'}")
+            raise DescriptionError(
+                f"{description.name} has no parameter {name!r}; it has {', '.join(known) or 'none'}"
+            )
     new = {name: quantity(f"parameters.{name}", value, known) for name, value in values.items()}
     return replace(description, parameters=Named(dict(known) | new))
 
@@ -90,9 +101,17 @@ def with_limits(
     """
     numbers = description.numbers
     n = description.n
-    own = {"lower": numbers.lower, "upper": numbers.upper, "velocity": numbers.velocity, "torque": numbers.effort}
+    own = {
+        "lower": numbers.lower,
+        "upper": numbers.upper,
+        "velocity": numbers.velocity,
+        "torque": numbers.effort,
+    }
     new = {"lower": lower, "upper": upper, "velocity": velocity, "torque": torque}
-    arrays = {name: own[name] if value is None else one_each(value, name, n) for name, value in new.items()}
+    arrays = {
+        name: own[name] if value is None else one_each(value, name, n)
+        for name, value in new.items()
+    }
     joints = []
     for i, joint in enumerate(description.joints):
         low, high, speed, effort = (float(array[i]) for array in arrays.values())
@@ -154,7 +173,9 @@ def with_payload(
 
 
 @takes_robot
-def with_uniform_links(description: Description, masses: Sequence[Quantity] | None = None) -> Description:
+def with_uniform_links(
+    description: Description, masses: Sequence[Quantity] | None = None
+) -> Description:
     """Return the arm with each link a thin uniform rod, its mass a parameter ``m1`` ... ``mn``.
 
     In the standard convention link i lies from frame i-1's origin to frame i's, in the modified one from frame i's to
@@ -175,17 +196,27 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     if masses is not None and len(masses) != n:
         raise DescriptionError(f"{len(masses)} masses; expected {n}, one a link")
     symbols = [f"m{i}" for i in range(1, n + 1)]
-    bare = replace(description, joints=tuple(replace(joint, bodies=()) for joint in description.joints))
+    bare = replace(
+        description, joints=tuple(replace(joint, bodies=()) for joint in description.joints)
+    )
     if taken := names_in(bare) & set(symbols):
-        raise DescriptionError(f"{description.name} uses {', '.join(sorted(taken))} for something else than a mass")
-    values = [exact(1)] * n if masses is None else [quantity(f"masses[{i}]", m, {}) for i, m in enumerate(masses)]
+        raise DescriptionError(
+            f"{description.name} uses {', '.join(sorted(taken))} for something else than a mass"
+        )
+    values = (
+        [exact(1)] * n
+        if masses is None
+        else [quantity(f"masses[{i}]", m, {}) for i, m in enumerate(masses)]
+    )
     joints = tuple(
         replace(
             joint,
             bodies=(rod(Expression.symbol(symbol), *ends),),
             assumed=tuple(dict.fromkeys((*joint.assumed, "body"))),
         )
-        for joint, symbol, ends in zip(description.joints, symbols, _link_ends(description), strict=True)
+        for joint, symbol, ends in zip(
+            description.joints, symbols, _link_ends(description), strict=True
+        )
     )
     parameters = Named(dict(description.parameters) | dict(zip(symbols, values, strict=True)))
     return replace(description, joints=joints, parameters=parameters)
@@ -194,7 +225,9 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
 def _link_ends(description: Description) -> list[tuple[Vector, Vector]]:
     """Return where each link's rod begins and ends, in the link's own frame, m."""
     if (far := description.numbers.link_ends) is not None:
-        return [(_exact_vector(begin), _exact_vector(end)) for begin, end in zip(*far, strict=True)][1:]
+        return [
+            (_exact_vector(begin), _exact_vector(end)) for begin, end in zip(*far, strict=True)
+        ][1:]
 
     # Frame i of the modified convention is at the beginning of link i, and frame i + 1, at A_(i+1) (0, 0, 0) in it, at
     # its end. Frame i of the standard convention is at the end, and frame i - 1, at A_i^-1 (0, 0, 0) in it, at the
@@ -243,7 +276,9 @@ def _without_rounding(angle: float) -> float:
 def _inertia_tensor(inertia: ArrayLike) -> Array:
     tensor = number_array(inertia, "payload: inertia", "(3, 3)")
     if tensor.shape != (3, 3) or is_asymmetric(tensor):
-        raise DescriptionError(f"payload: inertia has shape {tensor.shape}; expected a symmetric (3, 3) matrix")
+        raise DescriptionError(
+            f"payload: inertia has shape {tensor.shape}; expected a symmetric (3, 3) matrix"
+        )
     if not np.all(np.isfinite(tensor)):
         raise DescriptionError("payload: inertia is not finite")
     return tensor

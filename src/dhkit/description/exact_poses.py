@@ -9,7 +9,18 @@ import numpy as np
 from dhkit.description.bodies import ExactPose, settled_vector
 from dhkit.description.poses import pose_parts
 from dhkit.description.values import ONE, Convention, Joint, Placement
-from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exact, exact_angle, sin, sqrt, substitute
+from dhkit.expressions import (
+    ZERO,
+    Expression,
+    arc_tangent,
+    cos,
+    decimals,
+    exact,
+    exact_angle,
+    sin,
+    sqrt,
+    substitute,
+)
 
 
 def identity() -> ExactPose:
@@ -54,7 +65,9 @@ def pose_of(placement: Placement, values: Mapping[str, Expression] | None = None
     # T(x, y, z) Rz(yaw) Ry(pitch) Rx(roll)
     x, y, z = (substitute(entry, known) for entry in placement.xyz)
     roll, pitch, yaw = (exact_angle(substitute(entry, known)) for entry in placement.rpy)
-    T: ExactPose = translation(x, y, z) @ rotation_z(yaw) @ _plane_rotation(2, 0, pitch) @ rotation_x(roll)
+    T: ExactPose = (
+        translation(x, y, z) @ rotation_z(yaw) @ _plane_rotation(2, 0, pitch) @ rotation_x(roll)
+    )
     return T
 
 

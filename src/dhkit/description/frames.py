@@ -57,7 +57,9 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
             return np.stack(rows)
     array = number_array(q, name, "(..., n)")
     if array.shape[-1:] != (description.n,):
-        raise ValueError(f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}")
+        raise ValueError(
+            f"{name} has shape {array.shape}; expected (..., {description.n}) for {description.name}"
+        )
     return array
 
 
@@ -91,7 +93,9 @@ def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Arr
     if vector.shape != (description.n,):
         raise ValueError(f"{name} has shape {vector.shape}; expected ({description.n},)")
     if not np.isfinite(vector).all():
-        raise ValueError(f"{name} has values that are not finite: {vector.tolist()}; expected finite values")
+        raise ValueError(
+            f"{name} has values that are not finite: {vector.tolist()}; expected finite values"
+        )
     return vector
 
 
@@ -225,4 +229,7 @@ def has_same_geometry(first: Description, second: Description) -> bool:
     """Return whether all frames of two arms are at the same places for equal joint values; their bodies may differ."""
     if first.convention is not second.convention or first.kinds != second.kinds:
         return False
-    return all(np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in _GEOMETRY)
+    return all(
+        np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name))
+        for name in _GEOMETRY
+    )

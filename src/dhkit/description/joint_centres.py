@@ -34,7 +34,9 @@ class LinkEnds(NamedTuple):
         return lengths
 
 
-def link_ends(a: Array, d: Array, cos_alpha: Array, sin_alpha: Array, *, is_standard: bool, tool: Array) -> LinkEnds:
+def link_ends(
+    a: Array, d: Array, cos_alpha: Array, sin_alpha: Array, *, is_standard: bool, tool: Array
+) -> LinkEnds:
     """Return the ends of links at the joint centres of a table.
 
     Joint i turns about z of frame i - 1 (standard) or i (modified), and s_i is the height of its centre in that frame.

@@ -58,7 +58,9 @@ def degrees_hint(value: float, *, slides: bool) -> str:
     return f" ({abs(value) / math.tau:.3g} turns; were degrees meant?)"
 
 
-def violated_limit_text(value: float, lower: float, upper: float, *, slides: bool, digits: int = 6) -> str:
+def violated_limit_text(
+    value: float, lower: float, upper: float, *, slides: bool, digits: int = 6
+) -> str:
     """Return which limit a joint value violates and by which numbers; empty for a value within the limits.
 
     All numbers are in rad, or in m where the joint ``slides``. A violation below :data:`LIMIT_ROUNDING` is none.

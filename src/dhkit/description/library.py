@@ -40,4 +40,8 @@ def library_robot(name: str) -> Description:
         close = difflib.get_close_matches(name.lower(), robots(), n=1, cutoff=0.5)
         hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(robots())}"
         raise DescriptionError(f"no robot {name[:80]!r} in the library; {hint}")
-    return from_toml((FOLDER / f"{name}.toml").read_text("utf-8"), file=f"{name}.toml", mesh_folder=asset("meshes"))
+    return from_toml(
+        (FOLDER / f"{name}.toml").read_text("utf-8"),
+        file=f"{name}.toml",
+        mesh_folder=asset("meshes"),
+    )

@@ -131,24 +131,38 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
         # The check of the new description may have spent the reading budget, which it reports so; a real fault is
         # raised again below.
         log.debug("%s: %s", description.name, error)
-    names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(locked.values()))
-    log.info("%s: locked as numbers, since %s would make long expressions", description.name, ", ".join(sorted(names)))
+    names = names_in((description.base, description.joints, description.tool)) | names_in(
+        tuple(locked.values())
+    )
+    log.info(
+        "%s: locked as numbers, since %s would make long expressions",
+        description.name,
+        ", ".join(sorted(names)),
+    )
     try:
         return _lock_all(*_with_numbers(description, locked, names))
     except ExpressionError as error:
         raise DescriptionError(f"{description.name} cannot be locked: {error}") from None
 
 
-def _locked_places(description: Description, joints: Mapping[int | str, Quantity]) -> dict[int, Expression]:
+def _locked_places(
+    description: Description, joints: Mapping[int | str, Quantity]
+) -> dict[int, Expression]:
     """Return the value of each locked joint, rad or m, by its place from 0."""
     if not isinstance(joints, Mapping):
-        raise DescriptionError(f"lock: found {type(joints).__name__}; expected joints with where, such as {{3: 0.0}}")
+        raise DescriptionError(
+            f"lock: found {type(joints).__name__}; expected joints with where, such as {{3: 0.0}}"
+        )
     names = [joint.name for joint in description.joints]
     locked: dict[int, Expression] = {}
     for key, value in joints.items():
         if isinstance(key, str) and key in names:
             place = names.index(key)
-        elif isinstance(key, (int, np.integer)) and not isinstance(key, bool) and 0 <= key < description.n:
+        elif (
+            isinstance(key, (int, np.integer))
+            and not isinstance(key, bool)
+            and 0 <= key < description.n
+        ):
             place = int(key)
         else:
             raise DescriptionError(
@@ -188,7 +202,9 @@ def _with_numbers(
     known = {name: values[name] for name in names}
     remaining = Named({name: value for name, value in parameters.items() if name not in known})
     fixed = with_values(replace(description, parameters=Named(values)), known)
-    return replace(fixed, parameters=remaining), {place: substitute(q, known) for place, q in locked.items()}
+    return replace(fixed, parameters=remaining), {
+        place: substitute(q, known) for place, q in locked.items()
+    }
 
 
 def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Description:
@@ -205,7 +221,9 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     first = next(place for place in range(description.n + 1) if place not in locked)
     inwards = sorted((place for place in locked if place > first), reverse=True)
     for place in range(first):
-        chain = _lock_one(chain, description.convention, 0, locked[place], values)  # those before it are gone
+        chain = _lock_one(
+            chain, description.convention, 0, locked[place], values
+        )  # those before it are gone
     for place in inwards:
         chain = _lock_one(chain, description.convention, place - first, locked[place], values)
     moving = [i for i in range(description.n) if i not in locked]
@@ -223,7 +241,9 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
         ),
         tool=chain.tool,
         couplings=tuple(
-            replace(coupling, joints=(new_numbers[coupling.joints[0]], new_numbers[coupling.joints[1]]))
+            replace(
+                coupling, joints=(new_numbers[coupling.joints[0]], new_numbers[coupling.joints[1]])
+            )
             for coupling in description.couplings
             if new_numbers.keys() >= set(coupling.joints)
         ),
@@ -239,7 +259,11 @@ def _link_bodies(joint: Joint, parts: _LinkBodies) -> tuple[Body, ...]:
 
 
 def _lock_one(
-    chain: _ArmParts, convention: Convention, place: int, q: Expression, values: Mapping[str, Expression]
+    chain: _ArmParts,
+    convention: Convention,
+    place: int,
+    q: Expression,
+    values: Mapping[str, Expression],
 ) -> _ArmParts:
     """Lock the joint at a place: the first joins the base, the last the tool, others the link before."""
     row = fixed_row(chain.joints[place], convention, q)
@@ -257,7 +281,9 @@ def _join_base(chain: _ArmParts, row: ExactPose) -> _ArmParts:
     placement = placement_of(pose_of(chain.base.placement) @ row)
     shapes = _joined_shapes(_moved_shapes(chain.base.shapes, T_new_old), chain.joints[0].shapes)
     on_base = _moved_bodies(chain.bodies[0], T_new_old) + chain.bodies[1]
-    return _ArmParts(Base(placement, shapes), chain.joints[1:], chain.tool, (on_base, *chain.bodies[2:]))
+    return _ArmParts(
+        Base(placement, shapes), chain.joints[1:], chain.tool, (on_base, *chain.bodies[2:])
+    )
 
 
 def _join_tool(chain: _ArmParts, row: ExactPose) -> _ArmParts:
@@ -267,11 +293,17 @@ def _join_tool(chain: _ArmParts, row: ExactPose) -> _ArmParts:
     *other_bodies, own_bodies, last_bodies = chain.bodies
     tool = Tool(placement_of(row @ pose_of(chain.tool.placement)), chain.tool.shapes)
     joints = (*others, _with_shapes_of(before, last, identity(), row))
-    return _ArmParts(chain.base, joints, tool, (*other_bodies, own_bodies + _moved_bodies(last_bodies, row)))
+    return _ArmParts(
+        chain.base, joints, tool, (*other_bodies, own_bodies + _moved_bodies(last_bodies, row))
+    )
 
 
 def _join_link_before(
-    chain: _ArmParts, convention: Convention, place: int, row: ExactPose, values: Mapping[str, Expression]
+    chain: _ArmParts,
+    convention: Convention,
+    place: int,
+    row: ExactPose,
+    values: Mapping[str, Expression],
 ) -> _ArmParts:
     """Make the locked link part of the one before, and the locked row part of the two neighbouring rows."""
     before, locked, after = chain.joints[place - 1 : place + 2]
@@ -300,9 +332,13 @@ def _join_link_before(
     )
 
 
-def _with_shapes_of(before: Joint, locked: Joint, T_new_before: ExactPose, T_new_locked: ExactPose) -> Joint:
+def _with_shapes_of(
+    before: Joint, locked: Joint, T_new_before: ExactPose, T_new_locked: ExactPose
+) -> Joint:
     """Return the link before with the locked link's shapes, both moved into the new frame."""
-    shapes = _joined_shapes(_moved_shapes(before.shapes, T_new_before), _moved_shapes(locked.shapes, T_new_locked))
+    shapes = _joined_shapes(
+        _moved_shapes(before.shapes, T_new_before), _moved_shapes(locked.shapes, T_new_locked)
+    )
     assumed = before.assumed
     if "body" in locked.assumed and "body" not in assumed:
         assumed = (*assumed, "body")
@@ -325,7 +361,11 @@ def _moved_shapes(shapes: tuple[Shape, ...], T: ExactPose) -> tuple[Shape, ...]:
 
 def _screw_about_axis(joint: Joint, angle: Expression, shift: Expression) -> Joint:
     """Return a row rotated about its own joint's axis by an angle, rad, and shifted along it, m."""
-    return replace(joint, theta=exact_angle(settled(joint.theta + angle, angle=True)), d=settled(joint.d + shift))
+    return replace(
+        joint,
+        theta=exact_angle(settled(joint.theta + angle, angle=True)),
+        d=settled(joint.d + shift),
+    )
 
 
 def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:

@@ -26,10 +26,23 @@ _MATRIX = 14
 """Element type of a variable."""
 _COMPRESSED = 15
 """Element type of a compressed variable."""
-_NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_NUMBER_TYPES = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
 """Element types of numbers as NumPy's; MATLAB stores doubles in the shortest type that holds them exactly."""
 _TEXT_CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-_CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse matrix", "double", "single"), start=1)) | {
+_CLASSES = dict(
+    enumerate(("cell", "struct", "object", "char", "sparse matrix", "double", "single"), start=1)
+) | {
     **{8 + k: f"{'u' if k % 2 else ''}int{8 << k // 2}" for k in range(8)},
     16: "function",
 }
@@ -80,7 +93,9 @@ class MatVariable:
             The variable is of another class, or the file is damaged there; names the variable.
         """
         if not self.parts:
-            raise DescriptionError(f"{self.name}: found a {self.kind}; expected real numbers or text")
+            raise DescriptionError(
+                f"{self.name}: found a {self.kind}; expected real numbers or text"
+            )
         return self.reader.value(self)
 
 
@@ -130,7 +145,11 @@ class _ElementReader:
 
     def variables(self, data: bytes) -> Iterator[MatVariable]:
         for element in self.elements(data):
-            inner = self.elements(self._unpack(element.data)) if element.kind == _COMPRESSED else [element]
+            inner = (
+                self.elements(self._unpack(element.data))
+                if element.kind == _COMPRESSED
+                else [element]
+            )
             yield from (self._variable(matrix.data) for matrix in inner if matrix.kind == _MATRIX)
 
     def elements(self, data: bytes) -> Iterator[_Element]:
@@ -139,7 +158,9 @@ class _ElementReader:
         while offset < len(data):
             _require(len(data) - offset >= _TAG_LENGTH)
             kind, length = struct.unpack_from(f"{self.order}II", data, offset)
-            if kind >> 16:  # a small element: length and type share the first word, its data is the second
+            if (
+                kind >> 16
+            ):  # a small element: length and type share the first word, its data is the second
                 length = kind >> 16
                 kind &= 0xFFFF
                 start = offset + _TAG_LENGTH // 2
@@ -160,7 +181,9 @@ class _ElementReader:
         except zlib.error as error:
             raise DescriptionError(f"damaged: {error}") from None
         if len(unpacked) >= remaining:
-            raise DescriptionError(f"unpacks to more than the {self.max_bytes / 1e6:g} MB that are read")
+            raise DescriptionError(
+                f"unpacks to more than the {self.max_bytes / 1e6:g} MB that are read"
+            )
         _require(unpacker.eof)
         self.unpacked += len(unpacked)
         return unpacked
@@ -207,7 +230,9 @@ class _ElementReader:
         _require(body.kind in _NUMBER_TYPES)
         dtype = np.dtype(f"{self.order}{_NUMBER_TYPES[body.kind]}")
         if int(np.prod(shape, dtype=object)) * dtype.itemsize != len(body.data):
-            raise DescriptionError(f"{name}: {len(body.data)} bytes for shape {shape}; the file is damaged")
+            raise DescriptionError(
+                f"{name}: {len(body.data)} bytes for shape {shape}; the file is damaged"
+            )
         return np.frombuffer(body.data, dtype).reshape(shape, order="F").astype(float)
 
     def _text(self, name: str, body: _Element) -> str:
@@ -219,26 +244,39 @@ class _ElementReader:
         except (UnicodeDecodeError, LookupError):
             raise DescriptionError(f"{name}: no text; the file is damaged") from None
 
-    def _records(self, name: str, parts: list[_Element], shape: tuple[int, ...]) -> tuple[dict[str, MatVariable], ...]:
+    def _records(
+        self, name: str, parts: list[_Element], shape: tuple[int, ...]
+    ) -> tuple[dict[str, MatVariable], ...]:
         """Return the fields of each struct of an array; in the file the names precede the fields of all structs."""
         _require(len(parts) >= 2 and len(parts[0].data) == 4)
         (length,) = struct.unpack(f"{self.order}i", parts[0].data)
         _require(0 < length <= BOUNDS.mat_name_characters + 1 and len(parts[1].data) % length == 0)
         text = parts[1].data
-        names = [_name(_Element(1, text[at : at + length].split(b"\0")[0])) for at in range(0, len(text), length)]
+        names = [
+            _name(_Element(1, text[at : at + length].split(b"\0")[0]))
+            for at in range(0, len(text), length)
+        ]
         fields = [part for part in parts[2:] if part.kind == _MATRIX]
-        _require(len(fields) == len(names) * int(np.prod(shape, dtype=object)) and len(set(names)) == len(names))
+        _require(
+            len(fields) == len(names) * int(np.prod(shape, dtype=object))
+            and len(set(names)) == len(names)
+        )
         depth = name.count(".") + 2
         variables = [
-            self._variable(field.data, f"{name}.{names[k % len(names)]}", depth) for k, field in enumerate(fields)
+            self._variable(field.data, f"{name}.{names[k % len(names)]}", depth)
+            for k, field in enumerate(fields)
         ]
-        records = [variables[at : at + len(names)] for at in range(0, len(variables), max(len(names), 1))]
+        records = [
+            variables[at : at + len(names)] for at in range(0, len(variables), max(len(names), 1))
+        ]
         return tuple(dict(zip(names, record, strict=True)) for record in records)
 
 
 def _name(element: _Element) -> str:
     name = element.data[: BOUNDS.mat_name_characters].decode("latin-1")
-    return name if name.isprintable() else ascii(name)[1:-1]  # messages have one line, whatever the file holds
+    return (
+        name if name.isprintable() else ascii(name)[1:-1]
+    )  # messages have one line, whatever the file holds
 
 
 def _next(parts: Iterator[_Element]) -> _Element:

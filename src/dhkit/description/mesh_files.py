@@ -81,9 +81,13 @@ def check_mesh_file(path: Path, max_bytes: int = BOUNDS.mesh_bytes) -> MeshHeade
         kind = "a folder" if stat.S_ISDIR(status.st_mode) else "not a regular file"
         raise MeshFileError(path, f"{kind}; expected a mesh file")
     if path.suffix.lower() not in MESH_FORMATS:
-        raise MeshFileError(path, f"ends in {path.suffix!r}; expected one of {', '.join(MESH_FORMATS)}")
+        raise MeshFileError(
+            path, f"ends in {path.suffix!r}; expected one of {', '.join(MESH_FORMATS)}"
+        )
     if status.st_size > max_bytes:
-        raise MeshFileError(path, f"more than {max_bytes / 1e6:g} MB; expected a mesh of at most that size")
+        raise MeshFileError(
+            path, f"more than {max_bytes / 1e6:g} MB; expected a mesh of at most that size"
+        )
     # Cached: descriptions are checked whenever one is made from another, up to 60 times a second in the lab.
     header = _header_or_fault(path, status.st_size, status.st_mtime_ns, status.st_ino)
     if isinstance(header, str):
@@ -109,7 +113,12 @@ def _header_or_fault(path: Path, size: int, _time: int, _inode: int) -> MeshHead
     """Return a file's header, or the reason why it is not a mesh."""
     if size == 0:
         return "an empty file; expected a mesh"
-    read_header = {".stl": _stl_header, ".obj": _obj_header, ".ply": _ply_header, ".dae": _dae_header}
+    read_header = {
+        ".stl": _stl_header,
+        ".obj": _obj_header,
+        ".ply": _ply_header,
+        ".dae": _dae_header,
+    }
     try:
         return read_header[path.suffix.lower()](path, size)
     except _FaultError as fault:
@@ -136,7 +145,10 @@ def _stl_header(path: Path, size: int) -> MeshHeader:
     if head.lstrip()[:5].lower() == b"solid" and b"\0" not in head:
         if b"facet" not in head.lower():
             raise _FaultError("no triangles: an ASCII STL without facets")
-        if b"endsolid" not in _bytes_at(path, max(0, size - _TEXT_END_LENGTH), _TEXT_END_LENGTH).lower():
+        if (
+            b"endsolid"
+            not in _bytes_at(path, max(0, size - _TEXT_END_LENGTH), _TEXT_END_LENGTH).lower()
+        ):
             raise _FaultError("truncated: an ASCII STL that does not end in 'endsolid'")
         return MeshHeader("stl_ascii", None)
     if len(head) < _STL_HEADER_LENGTH or b"\0" not in head:
@@ -182,7 +194,9 @@ def _ply_elements(lines: list[list[str]], *, is_ascii: bool) -> tuple[dict[str, 
     for words in lines:
         if words[:1] == ["element"]:
             if len(words) != 3 or not words[2].isdecimal() or len(words[2]) > 12:
-                raise _FaultError(f"no PLY: found {' '.join(words)[:60]!r}; expected 'element NAME COUNT'")
+                raise _FaultError(
+                    f"no PLY: found {' '.join(words)[:60]!r}; expected 'element NAME COUNT'"
+                )
             element = words[1]
             counts[element] = int(words[2])
         elif words[:1] == ["property"] and element and len(words) >= 3:
@@ -190,7 +204,9 @@ def _ply_elements(lines: list[list[str]], *, is_ascii: bool) -> tuple[dict[str, 
             if is_ascii:
                 each = 2 if words[1] != "list" else 8
             elif words[1] == "list" and len(words) >= 5:
-                each = _PLY_SIZES.get(words[2], 1) + 3 * _PLY_SIZES.get(words[3], 1) * (element == "face")
+                each = _PLY_SIZES.get(words[2], 1) + 3 * _PLY_SIZES.get(words[3], 1) * (
+                    element == "face"
+                )
             else:
                 each = _PLY_SIZES.get(words[1], 1)
             min_bytes += counts[element] * each
@@ -215,7 +231,9 @@ def _dae_header(path: Path, size: int) -> MeshHeader:
         depth -= 1
 
     def refuse(*_arguments: object) -> None:
-        raise _FaultError("has a document type or entities, which a COLLADA file does not need and dhkit does not read")
+        raise _FaultError(
+            "has a document type or entities, which a COLLADA file does not need and dhkit does not read"
+        )
 
     parser.StartElementHandler = start_element
     parser.EndElementHandler = end_element

@@ -133,16 +133,24 @@ class Numbers:
         gear = array(drive.gear if drive else 1.0 for drive in drives)
         prismatic = np.array([not j.is_revolute for j in joints])
         # How far each prismatic joint can move away from zero, m; one without limits adds nothing to the reach.
-        strokes = [float(stroke) for stroke in np.maximum(abs(lower), abs(upper))[prismatic] if np.isfinite(stroke)]
+        strokes = [
+            float(stroke)
+            for stroke in np.maximum(abs(lower), abs(upper))[prismatic]
+            if np.isfinite(stroke)
+        ]
         T_last_tool = matrix(description.tool.placement, values)
         cos_alpha = array(cos(x) for x in alpha)
         sin_alpha = array(sin(x) for x in alpha)
         is_standard = description.convention is Convention.STANDARD
-        ends = link_ends(a, d, cos_alpha, sin_alpha, is_standard=is_standard, tool=T_last_tool[:3, 3])
+        ends = link_ends(
+            a, d, cos_alpha, sin_alpha, is_standard=is_standard, tool=T_last_tool[:3, 3]
+        )
         along_table = float(np.sum(np.abs(a) + np.abs(d)))
         along_centres = float(ends.lengths.sum())
         is_far = along_table > FAR * along_centres
-        mass, com, inertia = zip(*(_body_arrays(_as_one(j.bodies, values), array, np.nan) for j in joints), strict=True)
+        mass, com, inertia = zip(
+            *(_body_arrays(_as_one(j.bodies, values), array, np.nan) for j in joints), strict=True
+        )
         configurations = {"zero": np.zeros(len(joints))}
         configurations |= {name: array(q) for name, q in description.configurations.items()}
         numbers = cls(
@@ -167,7 +175,8 @@ class Numbers:
             coupling=_coupling_matrix(description, array),
             # qd_motor = gear qd and tau = gear tau_motor: gear^2 B; |gear| Tc in the joint's directions.
             viscous=gear**2 * array(drive.viscous if drive else 0.0 for drive in drives),
-            coulomb=np.abs(gear)[:, None] * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
+            coulomb=np.abs(gear)[:, None]
+            * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
             base_body=_body_arrays(description.base.body, array, 0.0),
             gravity=array(description.gravity),
             T_world_base=matrix(description.base.placement, values),
@@ -190,7 +199,9 @@ def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
     names = set[str]()
     for entry in (*placement.xyz, *placement.rpy):
         names |= entry.symbols
-    return _cached_matrix(placement, tuple((name, value) for name, value in values.items() if name in names)).copy()
+    return _cached_matrix(
+        placement, tuple((name, value) for name, value in values.items() if name in names)
+    ).copy()
 
 
 @lru_cache(maxsize=1024)
@@ -204,7 +215,9 @@ def _cached_matrix(placement: Placement, values: tuple[tuple[str, Expression], .
     return pose
 
 
-def _coupling_matrix(description: RobotData, array: Callable[[Iterable[Expression]], Array]) -> Array:
+def _coupling_matrix(
+    description: RobotData, array: Callable[[Iterable[Expression]], Array]
+) -> Array:
     matrix = np.zeros((description.n, description.n))
     inertias = array(coupling.inertia for coupling in description.couplings)
     for coupling, inertia in zip(description.couplings, inertias, strict=True):
@@ -226,4 +239,8 @@ def _body_arrays(
     """Return mass, centre of mass and inertia of a body, all ``missing`` where there is none."""
     if body is None:
         return missing, np.full(3, missing), np.full((3, 3), missing)
-    return float(array([body.mass])[0]), array(body.com), np.array([array(row) for row in body.inertia.rows])
+    return (
+        float(array([body.mass])[0]),
+        array(body.com),
+        np.array([array(row) for row in body.inertia.rows]),
+    )

@@ -24,9 +24,13 @@ def check_parameter_name(name: str) -> None:
         No name, or the name of a constant, a function or a joint variable.
     """
     if not PARAMETER_NAME.fullmatch(name):
-        raise DescriptionError(f"parameters: {name[:80]!r} is not a name; expected letters, digits and _, 64 at most")
+        raise DescriptionError(
+            f"parameters: {name[:80]!r} is not a name; expected letters, digits and _, 64 at most"
+        )
     if name in CONSTANTS or name in FUNCTIONS:
-        raise DescriptionError(f"parameters: {name!r} is taken; expressions know it as a constant or function")
+        raise DescriptionError(
+            f"parameters: {name!r} is taken; expressions know it as a constant or function"
+        )
     if _JOINT_VARIABLE_NAME.fullmatch(name):
         raise DescriptionError(f"parameters: {name!r} is taken: joint variables are q1, q2 ...")
 

@@ -49,7 +49,9 @@ class Payload:
             raise DescriptionError("payload: inertia is not symmetric")
         object.__setattr__(self, "mass", mass.item())
         object.__setattr__(self, "com", tuple(com.tolist()))
-        object.__setattr__(self, "inertia", tuple(map(tuple, tensor.tolist())) if tensor.any() else None)
+        object.__setattr__(
+            self, "inertia", tuple(map(tuple, tensor.tolist())) if tensor.any() else None
+        )
 
         if self.mass < 0:
             raise DescriptionError(f"payload: mass is {self.mass:g} kg; expected none below 0")
@@ -76,7 +78,10 @@ class Payload:
         The inertia is about the centre of mass; off-diagonal entries have the tensor's sign, xy = -integral of x y dm.
         """
         tensor = np.zeros((3, 3)) if self.inertia is None else np.array(self.inertia)
-        return np.array([self.mass, *self.com, *(tensor[place] for place in INERTIA_PLACES.values())], dtype=float)
+        return np.array(
+            [self.mass, *self.com, *(tensor[place] for place in INERTIA_PLACES.values())],
+            dtype=float,
+        )
 
     @classmethod
     def of_numbers(cls, numbers: Array) -> Payload:

@@ -59,7 +59,9 @@ def pose(
     if quat is not None:
         rotation = _from_quaternion(_array("quat", quat, 4))
     else:
-        rotation = _from_euler(_array("euler", (0.0, 0.0, 0.0) if euler is None else euler, 3), order, degrees)
+        rotation = _from_euler(
+            _array("euler", (0.0, 0.0, 0.0) if euler is None else euler, 3), order, degrees
+        )
     batch = np.broadcast_shapes(position.shape[:-1], rotation.shape[:-2])
     T = np.zeros((*batch, 4, 4))
     T[..., :3, :3] = rotation
@@ -136,7 +138,9 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
     bottom = np.abs(array[..., 3, :] - (0, 0, 0, 1)).max(axis=-1)
     improper = np.linalg.det(R) < 0
     if np.any((defect > ORTHONORMAL) | (bottom > ORTHONORMAL) | improper):
-        raise ValueError(f"{name} is not a pose: its rotation must be orthonormal, its last row 0 0 0 1")
+        raise ValueError(
+            f"{name} is not a pose: its rotation must be orthonormal, its last row 0 0 0 1"
+        )
     return array
 
 
@@ -180,8 +184,15 @@ def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
     upper = order.upper()
     intrinsic = order == upper
     extrinsic = order == order.lower()
-    if len(order) != 3 or set(upper) - set("XYZ") or not (intrinsic or extrinsic) or upper[1] in (upper[0], upper[2]):
-        raise ValueError(f"order is {order!r}; expected three of XYZ (moving) or xyz (fixed), neighbours different")
+    if (
+        len(order) != 3
+        or set(upper) - set("XYZ")
+        or not (intrinsic or extrinsic)
+        or upper[1] in (upper[0], upper[2])
+    ):
+        raise ValueError(
+            f"order is {order!r}; expected three of XYZ (moving) or xyz (fixed), neighbours different"
+        )
     first, second, third = ("XYZ".index(letter) for letter in (upper if intrinsic else upper[::-1]))
     return (first, second, third), extrinsic
 

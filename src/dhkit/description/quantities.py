@@ -64,7 +64,11 @@ def without_variable(entry: Entry, number: int) -> Entry | str | int:
 
     Tables are printed so, and books print them so; the variable itself is added to theta, or to d, of every row.
     """
-    if isinstance(entry, str) and (match := _JOINT_VARIABLE.fullmatch(entry)) and int(match[1]) == number:
+    if (
+        isinstance(entry, str)
+        and (match := _JOINT_VARIABLE.fullmatch(entry))
+        and int(match[1]) == number
+    ):
         offset: str | None = match[2]
         return offset or 0
     return entry

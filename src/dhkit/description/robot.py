@@ -38,7 +38,8 @@ class Description(RobotData):
 
     def __post_init__(self) -> None:
         joints = tuple(
-            joint if joint.name else replace(joint, name=f"joint{i}") for i, joint in enumerate(self.joints, start=1)
+            joint if joint.name else replace(joint, name=f"joint{i}")
+            for i, joint in enumerate(self.joints, start=1)
         )
         object.__setattr__(self, "joints", joints)
         object.__setattr__(self, "warnings", check(self))
@@ -105,11 +106,15 @@ class Description(RobotData):
         values = resolved(self.parameters)
         masses = [body.mass for body in self.joints[-1].bodies if body.is_payload]
         if masses:
-            texts.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
+            texts.append(
+                f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg"
+            )
         return texts
 
 
-def takes_robot(function: Callable[Concatenate[Description, P], R]) -> Callable[Concatenate[Robot, P], R]:
+def takes_robot(
+    function: Callable[Concatenate[Description, P], R],
+) -> Callable[Concatenate[Robot, P], R]:
     """Return a function of a description that takes an arm as well, as first argument or as ``description=``."""
 
     @wraps(function)
@@ -145,7 +150,11 @@ def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
     DescriptionError
         Names the joints whose links have no body.
     """
-    bare = [f"{i} ({joint.name})" for i, joint in enumerate(description.joints, start=1) if not joint.bodies]
+    bare = [
+        f"{i} ({joint.name})"
+        for i, joint in enumerate(description.joints, start=1)
+        if not joint.bodies
+    ]
     if bare:
         plural, verb = ("s", "have") if len(bare) > 1 else ("", "has")
         raise DescriptionError(

@@ -8,7 +8,15 @@ from typing import Protocol, TypeAlias
 
 from dhkit.description.bodies import Vector
 from dhkit.description.named import Named
-from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Coupling, Joint, Tool, Units
+from dhkit.description.values import (
+    STANDARD_GRAVITY,
+    Base,
+    Convention,
+    Coupling,
+    Joint,
+    Tool,
+    Units,
+)
 from dhkit.expressions import Expression
 
 

@@ -67,7 +67,9 @@ def read_robot(path: str | Path) -> Description:
     return from_toml(text, file=str(path), mesh_folder=path.parent.resolve())
 
 
-def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None = None) -> Description:
+def from_toml(
+    text: str, *, file: str = "robot file", mesh_folder: Path | None = None
+) -> Description:
     """Read a robot file's text; ``file`` names it in messages, mesh paths are relative to ``mesh_folder``.
 
     Raises
@@ -79,7 +81,9 @@ def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None =
 
     try:
         if len(text) > BOUNDS.file_bytes:
-            raise DescriptionError(f"more than {BOUNDS.file_bytes / 1e6:g} MB; expected a robot file")
+            raise DescriptionError(
+                f"more than {BOUNDS.file_bytes / 1e6:g} MB; expected a robot file"
+            )
         with Budget():
             return _FormReader(validated(toml_document(text)), mesh_folder).description()
     except DescriptionError as error:
@@ -115,7 +119,9 @@ class _FormReader:
         return Description(
             name=form.name,
             convention=Convention(form.convention),
-            parameters=Named({name: self.number(f"parameters.{name}", x) for name, x in form.parameters.items()}),
+            parameters=Named(
+                {name: self.number(f"parameters.{name}", x) for name, x in form.parameters.items()}
+            ),
             joints=tuple(self.joint(i, joint) for i, joint in enumerate(form.joint, start=1)),
             gravity=self.vector("gravity", form.gravity),
             base=Base(
@@ -124,8 +130,12 @@ class _FormReader:
                 None if form.base.body is None else self.body("base", form.base.body),
             ),
             tool=Tool(self.placement("tool", form.tool), self.shapes("tool", form.tool.shape)),
-            configurations=Named({name: self.configuration(name, q) for name, q in form.configurations.items()}),
-            couplings=tuple(self.coupling(f"coupling[{k}]", entry) for k, entry in enumerate(form.coupling)),
+            configurations=Named(
+                {name: self.configuration(name, q) for name, q in form.configurations.items()}
+            ),
+            couplings=tuple(
+                self.coupling(f"coupling[{k}]", entry) for k, entry in enumerate(form.coupling)
+            ),
             source=form.source,
             notes=form.notes,
             drawn=form.drawn,
@@ -136,7 +146,11 @@ class _FormReader:
     def number(self, where: str, entry: Entry, unit: Expression = ONE) -> Expression:
         """Return the value of an entry: a bare number in this unit, or text in SI."""
         try:
-            return parse_quantity(entry, self.names, unit) if isinstance(entry, str) else exact(entry) * unit
+            return (
+                parse_quantity(entry, self.names, unit)
+                if isinstance(entry, str)
+                else exact(entry) * unit
+            )
         except ExpressionError as error:
             raise DescriptionError(f"{where}: {error}") from None
 
@@ -151,8 +165,12 @@ class _FormReader:
         return x, y, z
 
     def placement(self, where: str, form: ToolForm | ShapeForm | FrameForm) -> Placement:
-        roll, pitch, yaw = (self.angle(f"{where}: rpy[{i}]", entry) for i, entry in enumerate(form.rpy))
-        return Placement(self.vector(f"{where}: xyz", form.xyz, self.units.metres), (roll, pitch, yaw))
+        roll, pitch, yaw = (
+            self.angle(f"{where}: rpy[{i}]", entry) for i, entry in enumerate(form.rpy)
+        )
+        return Placement(
+            self.vector(f"{where}: xyz", form.xyz, self.units.metres), (roll, pitch, yaw)
+        )
 
     def motion(self, where: str, type: JointType, entry: Entry) -> Expression:
         """Return a value of the joint variable, or of its rate."""
@@ -169,7 +187,9 @@ class _FormReader:
             d = without_variable(d, number)
         limits = None
         if form.limits is not None:
-            lower, upper = (self.motion(f"{where}: limits[{i}]", kind, x) for i, x in enumerate(form.limits))
+            lower, upper = (
+                self.motion(f"{where}: limits[{i}]", kind, x) for i, x in enumerate(form.limits)
+            )
             limits = (lower, upper)
         return Joint(
             type=kind,
@@ -179,7 +199,9 @@ class _FormReader:
             theta=self.angle(f"{where}: theta", theta),
             name=form.name,
             limits=limits,
-            velocity=None if form.velocity is None else self.motion(f"{where}: velocity", kind, form.velocity),
+            velocity=None
+            if form.velocity is None
+            else self.motion(f"{where}: velocity", kind, form.velocity),
             effort=None if form.effort is None else self.number(f"{where}: effort", form.effort),
             bodies=self.bodies(where, form),
             drive=None if form.drive is None else self.drive(f"{where}: drive", form.drive),
@@ -191,22 +213,27 @@ class _FormReader:
         if form.bodies is None:
             return () if form.body is None else (self.body(where, form.body),)
         return tuple(
-            self.body(f"{where}, {body.name[:40] or f'body {k}'}", body) for k, body in enumerate(form.bodies, start=1)
+            self.body(f"{where}, {body.name[:40] or f'body {k}'}", body)
+            for k, body in enumerate(form.bodies, start=1)
         )
 
     def body(self, where: str, form: BodyForm) -> Body:
         moments = {
-            key: self.number(f"{where}: body.inertia.{key}", getattr(form.inertia, key)) for key in INERTIA_PLACES
+            key: self.number(f"{where}: body.inertia.{key}", getattr(form.inertia, key))
+            for key in INERTIA_PLACES
         }
         mass = self.number(f"{where}: body.mass", form.mass)
         com = self.vector(f"{where}: body.com", form.com, self.units.metres)
         return Body(mass, com, Inertia(**moments), form.unphysical, form.name)
 
     def drive(self, where: str, form: DriveForm) -> Drive:
-        coulomb = [self.number(f"{where}.coulomb[{i}]", entry) for i, entry in enumerate(form.coulomb)]
+        coulomb = [
+            self.number(f"{where}.coulomb[{i}]", entry) for i, entry in enumerate(form.coulomb)
+        ]
         positive, negative = coulomb if len(coulomb) == 2 else (coulomb[0], -coulomb[0])
         gear, rotor_inertia, viscous = (
-            self.number(f"{where}.{key}", getattr(form, key)) for key in ("gear", "rotor_inertia", "viscous")
+            self.number(f"{where}.{key}", getattr(form, key))
+            for key in ("gear", "rotor_inertia", "viscous")
         )
         return Drive(gear, rotor_inertia, viscous, (positive, negative))
 
@@ -231,13 +258,18 @@ class _FormReader:
             return Sphere(self.length(f"{where}.sphere.radius", form.sphere.radius))
         for kind, ends in ((Cylinder, form.cylinder), (Capsule, form.capsule)):
             if ends is not None:
-                return kind(self.length(f"{where}.radius", ends.radius), self.length(f"{where}.length", ends.length))
+                return kind(
+                    self.length(f"{where}.radius", ends.radius),
+                    self.length(f"{where}.length", ends.length),
+                )
         raise DescriptionError(f"{where}: no geometry")
 
     def configuration(self, name: str, q: Sequence[Entry]) -> tuple[Expression, ...]:
         where = f"configurations.{name[:80]}"
         if len(q) != len(self.form.joint):
-            raise DescriptionError(f"{where}: {len(q)} numbers; expected {len(self.form.joint)}, one a joint")
+            raise DescriptionError(
+                f"{where}: {len(q)} numbers; expected {len(self.form.joint)}, one a joint"
+            )
         return tuple(
             self.motion(f"{where}[{i}]", JointType(joint.type), entry)
             for i, (joint, entry) in enumerate(zip(self.form.joint, q, strict=True))

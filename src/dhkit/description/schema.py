@@ -53,7 +53,9 @@ def _keyed_inertia(value: object) -> object:
     if not isinstance(value, list):
         return value
     if len(value) != 3 or not all(isinstance(row, list) and len(row) == 3 for row in value):
-        raise expected("keys xx, yy, zz, xy, yz, xz or a 3x3 matrix; tools order plain lists differently")
+        raise expected(
+            "keys xx, yy, zz, xy, yz, xz or a 3x3 matrix; tools order plain lists differently"
+        )
     rows = []
     for row in value:
         entries = [_entry(entry) for entry in row]
@@ -83,7 +85,9 @@ class _AlsoTakes:
     def __init__(self, other: Callable[[JsonSchemaValue], JsonSchemaValue]) -> None:
         self.other = other
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
         own = handler(schema)
         return {"anyOf": [own, self.other(own)]}
 
@@ -125,7 +129,9 @@ class InertiaForm(Form):
     xz: Number = 0
 
 
-_InertiaEntry = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)]
+_InertiaEntry = Annotated[
+    InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)
+]
 
 
 class BodyForm(Form):
@@ -134,9 +140,9 @@ class BodyForm(Form):
     name: Text = ""
     mass: Number
     com: Triple = Field(default=[0, 0, 0])
-    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)] = (
-        InertiaForm()
-    )
+    inertia: Annotated[
+        InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)
+    ] = InertiaForm()
     unphysical: bool = False
 
 
@@ -179,7 +185,11 @@ class ShapeForm(Form):
     """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame, or in ``frame``."""
 
     mesh: Text | None = None
-    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: _NUMBER)] = [1, 1, 1]
+    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: _NUMBER)] = [
+        1,
+        1,
+        1,
+    ]
     box: Triple | None = None
     cylinder: RoundForm | None = None
     capsule: RoundForm | None = None
@@ -194,7 +204,9 @@ class ShapeForm(Form):
         kinds = ("mesh", "box", "cylinder", "capsule", "sphere")
         given = [kind for kind in kinds if getattr(self, kind) is not None]
         if len(given) != 1:
-            raise expected(f"exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}")
+            raise expected(
+                f"exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}"
+            )
         return self
 
 
@@ -224,9 +236,11 @@ class JointForm(Form):
     bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=BOUNDS.bodies)] | None = None
     drive: DriveForm | None = None
     shape: Shapes
-    assumed: list[Literal["a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"]] = (
-        Field(default=[], max_length=10)
-    )
+    assumed: list[
+        Literal[
+            "a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"
+        ]
+    ] = Field(default=[], max_length=10)
 
     @model_validator(mode="after")
     def _one_of_body_and_bodies(self) -> JointForm:
@@ -238,7 +252,9 @@ class JointForm(Form):
 class CouplingForm(Form):
     """Inertia of a drive that two joints turn, kg m^2, kg m or kg; joints by number, from 1."""
 
-    joints: Annotated[list[Annotated[int, Field(ge=1, le=BOUNDS.joints)]], Field(min_length=2, max_length=2)]
+    joints: Annotated[
+        list[Annotated[int, Field(ge=1, le=BOUNDS.joints)]], Field(min_length=2, max_length=2)
+    ]
     inertia: Number
 
 
@@ -342,7 +358,11 @@ def _fault_text(error: ErrorDetails, document: Document) -> str:
 def length_bound(error: ErrorDetails) -> str:
     """Return how many entries a list may have that is too long or too short: ``at most 3``."""
     bounds = error["ctx"]
-    return f"at most {bounds['max_length']}" if "max_length" in bounds else f"at least {bounds['min_length']}"
+    return (
+        f"at most {bounds['max_length']}"
+        if "max_length" in bounds
+        else f"at least {bounds['min_length']}"
+    )
 
 
 def shortened(value: object) -> str:
@@ -353,7 +373,9 @@ def shortened(value: object) -> str:
 
 def key_text(path: KeyPath) -> str:
     """Return a path of keys and indices as the beginning of a message: ``body.com[0]: ``; empty for no keys."""
-    keys = "".join(f"[{part}]" if isinstance(part, int) else f".{part[:80]}" for part in path).removeprefix(".")
+    keys = "".join(
+        f"[{part}]" if isinstance(part, int) else f".{part[:80]}" for part in path
+    ).removeprefix(".")
     return f"{keys}: " if keys else ""
 
 

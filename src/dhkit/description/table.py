@@ -67,7 +67,12 @@ class DHTable:
         rows = []
         latex_rows = []
         for i, joint in enumerate(description.joints, start=1):
-            texts = angle(joint.theta), length(joint.d, units), length(joint.a, units), angle(joint.alpha)
+            texts = (
+                angle(joint.theta),
+                length(joint.d, units),
+                length(joint.a, units),
+                angle(joint.alpha),
+            )
             row = [f"{i} {joint.name}"]
             latex_row = [str(i)]
             for column, text in zip(COLUMNS, texts, strict=True):
@@ -92,14 +97,19 @@ class DHTable:
 
     def _repr_html_(self) -> str:
         caption = f"{self.convention.value} DH"
-        return html_table(self.headings, self.rows, caption, most=len(self.rows), longest=_MAX_CELL_LENGTH)
+        return html_table(
+            self.headings, self.rows, caption, most=len(self.rows), longest=_MAX_CELL_LENGTH
+        )
 
     def latex(self) -> str:
         """Return the table as a LaTeX ``tabular``."""
         shift = "_{i-1}" if self.convention is Convention.MODIFIED else "_i"
         unit = self.headings[2].partition(" ")[2]
         titles = ["$i$", r"$\theta_i$", f"$d_i$ {unit}", f"$a{shift}$ {unit}", rf"$\alpha{shift}$"]
-        lines = [" & ".join(titles) + r" \\ \hline", *(" & ".join(row) + r" \\" for row in self.latex_rows)]
+        lines = [
+            " & ".join(titles) + r" \\ \hline",
+            *(" & ".join(row) + r" \\" for row in self.latex_rows),
+        ]
         return "\n".join([r"\begin{tabular}{ccccc}", *lines, r"\end{tabular}"])
 
 

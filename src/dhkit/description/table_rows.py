@@ -22,7 +22,9 @@ Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
 """A number, or text: ``0.4318``, ``"17*inch"``, ``"l1/2"``."""
 
 
-def quantity(where: str, value: object, names: Mapping[str, object], unit: Expression | None = None) -> Expression:
+def quantity(
+    where: str, value: object, names: Mapping[str, object], unit: Expression | None = None
+) -> Expression:
     """Return an argument's exact value; numbers are in ``unit``, expressions are in SI and may use these ``names``.
 
     Raises
@@ -90,7 +92,9 @@ def from_dh(
     (2, 0.5)
     """
     if sorted(order) != sorted(COLUMNS):
-        raise DescriptionError(f"order is {tuple(order)}; expected {', '.join(COLUMNS)} in some order")
+        raise DescriptionError(
+            f"order is {tuple(order)}; expected {', '.join(COLUMNS)} in some order"
+        )
     for what, value, known in (
         ("convention", convention, [c.value for c in Convention]),
         ("angle", angle, list(Units.ANGLES)),
@@ -102,15 +106,21 @@ def from_dh(
     given = kinds or "R" * len(rows)
     letters = "".join(map(str, given)).upper() if hasattr(given, "__len__") else ""
     if len(letters) != len(rows) or set(letters) - {"R", "P"}:
-        raise DescriptionError(f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row")
+        raise DescriptionError(
+            f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row"
+        )
     units = Units(length, angle)
     names = dict(parameters or {})
     for key in names:
         check_parameter_name(key)
-    joints = [_joint(i, row, order, letters[i - 1], units, names) for i, row in enumerate(rows, start=1)]
+    joints = [
+        _joint(i, row, order, letters[i - 1], units, names) for i, row in enumerate(rows, start=1)
+    ]
     for what, several in (("limits", limits), ("bodies", bodies)):
         if several is not None and len(several) != len(joints):
-            raise DescriptionError(f"{what}: {len(several)} entries; expected {len(joints)}, one a joint")
+            raise DescriptionError(
+                f"{what}: {len(several)} entries; expected {len(joints)}, one a joint"
+            )
     for i, pair in enumerate(limits or ()):
         if pair is not None:
             joints[i] = replace(joints[i], limits=_limits(i + 1, pair, joints[i], units, names))
@@ -121,7 +131,9 @@ def from_dh(
         name=name,
         convention=Convention(convention),
         joints=tuple(joints),
-        parameters=Named({key: quantity(f"parameters.{key}", value, names) for key, value in names.items()}),
+        parameters=Named(
+            {key: quantity(f"parameters.{key}", value, names) for key, value in names.items()}
+        ),
         units=units,
     )
 
@@ -140,7 +152,9 @@ def _joint(
 ) -> Joint:
     kind = JointType.REVOLUTE if letter == "R" else JointType.PRISMATIC
     entries = {
-        key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
+        key: quantity(
+            f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians
+        )
         for key, value in _named_entries(number, row, order, kind).items()
     }
     theta, alpha = (exact_angle(entries[key]) for key in ("theta", "alpha"))
@@ -148,7 +162,10 @@ def _joint(
 
 
 def _named_entries(
-    number: int, row: Sequence[Quantity] | Mapping[str, Quantity], order: Sequence[str], kind: JointType
+    number: int,
+    row: Sequence[Quantity] | Mapping[str, Quantity],
+    order: Sequence[str],
+    kind: JointType,
 ) -> dict[str, Quantity]:
     """Return the entries of a row by their names, without the joint variable."""
     if isinstance(row, Mapping):
@@ -169,7 +186,9 @@ def _limits(
     number: int, pair: Sequence[Quantity], joint: Joint, units: Units, names: Mapping[str, object]
 ) -> tuple[Expression, Expression]:
     if not _has_length(pair, 2):
-        raise DescriptionError(f"limits of joint {number}: found {pair!r}; expected lowest and highest value, or None")
+        raise DescriptionError(
+            f"limits of joint {number}: found {pair!r}; expected lowest and highest value, or None"
+        )
     unit = units.radians if joint.is_revolute else units.metres
     low, high = (quantity(f"limits of joint {number}", value, names, unit) for value in pair)
     return low, high
@@ -179,8 +198,14 @@ def _body(number: int, body: object, names: Mapping[str, object]) -> Body:
     if isinstance(body, Body):
         return body
     where = f"body of link {number}"
-    if not isinstance(body, Mapping) or "mass" not in body or set(body) - {"mass", "com", "inertia"}:
-        raise DescriptionError(f"{where}: found {str(body)[:80]}; expected a Body, or mass, com and inertia by name")
+    if (
+        not isinstance(body, Mapping)
+        or "mass" not in body
+        or set(body) - {"mass", "com", "inertia"}
+    ):
+        raise DescriptionError(
+            f"{where}: found {str(body)[:80]}; expected a Body, or mass, com and inertia by name"
+        )
     com = tuple(quantity(f"{where}: com", value, names) for value in body.get("com", (0, 0, 0)))
     if len(com) != 3:
         raise DescriptionError(f"{where}: com has {len(com)} numbers; expected 3")

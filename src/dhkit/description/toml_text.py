@@ -19,7 +19,9 @@ _DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']
 
 Possessive quantifiers keep this expression itself linear."""
 _LINE = re.compile(r"\(at line (\d+),")
-_UNQUOTED = re.compile(r"[=,\[]\s*(?!(?:true|false|inf|nan)\b)([^\s\"'\[{,#]*[A-Za-z*/][^\"',\]}#]{0,200})")
+_UNQUOTED = re.compile(
+    r"[=,\[]\s*(?!(?:true|false|inf|nan)\b)([^\s\"'\[{,#]*[A-Za-z*/][^\"',\]}#]{0,200})"
+)
 """A value, of a key or in a list, that is neither text nor a number."""
 
 
@@ -39,14 +41,20 @@ def toml_document(text: str) -> Document:
     except RecursionError:
         raise DescriptionError("nested too deep") from None
     except ValueError as error:
-        raise DescriptionError(f"not TOML: {str(error)[:200]}{_unquoted(text, str(error))}") from None
+        raise DescriptionError(
+            f"not TOML: {str(error)[:200]}{_unquoted(text, str(error))}"
+        ) from None
     return document
 
 
 def _unquoted(text: str, message: str) -> str:
     """Return a hint if the parser stopped in a line with an expression or a name that lacks its quotes."""
     place = _LINE.search(message)
-    value = _UNQUOTED.search(text.split("\n")[int(place[1]) - 1][: BOUNDS.hint_characters]) if place else None
+    value = (
+        _UNQUOTED.search(text.split("\n")[int(place[1]) - 1][: BOUNDS.hint_characters])
+        if place
+        else None
+    )
     return f'; names and expressions are in quotes: "{value[1].strip()[:40]}"' if value else ""
 
 

@@ -47,7 +47,9 @@ def toml_text(description: RobotData) -> str:
     if not description.drawn:
         document["drawn"] = False
     if description.parameters:
-        document["parameters"] = _table({name: _entry(value) for name, value in description.parameters.items()})
+        document["parameters"] = _table(
+            {name: _entry(value) for name, value in description.parameters.items()}
+        )
     joints = tomlkit.aot()
     for joint in description.joints:
         joints.append(_table(_joint(joint, units)))
@@ -68,7 +70,10 @@ def toml_text(description: RobotData) -> str:
     if description.configurations:
         configurations = {}
         for name, q in description.configurations.items():
-            entries = [_motion(entry, joint, units) for entry, joint in zip(q, description.joints, strict=True)]
+            entries = [
+                _motion(entry, joint, units)
+                for entry, joint in zip(q, description.joints, strict=True)
+            ]
             configurations[name] = _array(entries)
         document["configurations"] = _table(configurations)
     return tomlkit.dumps(document)
@@ -105,7 +110,9 @@ def _body(body: Body, units: Units) -> InlineTable:
     content: _Content = {"name": body.name} if body.name else {}
     content["mass"] = _entry(body.mass)
     content |= _nonzero_entries("com", body.com, units.metres)
-    if moments := {key: _entry(moment) for key, moment in vars(body.inertia).items() if not moment.is_zero}:
+    if moments := {
+        key: _entry(moment) for key, moment in vars(body.inertia).items() if not moment.is_zero
+    }:
         content["inertia"] = _inline_table(moments)
     if body.unphysical:
         content["unphysical"] = True
@@ -118,7 +125,9 @@ def _drive(drive: Drive) -> InlineTable:
 
 
 def _placement(placement: Placement, units: Units) -> _Content:
-    return _nonzero_entries("xyz", placement.xyz, units.metres) | _nonzero_entries("rpy", placement.rpy, units.radians)
+    return _nonzero_entries("xyz", placement.xyz, units.metres) | _nonzero_entries(
+        "rpy", placement.rpy, units.radians
+    )
 
 
 def _shapes(shapes: Sequence[Shape], units: Units) -> _Content:
@@ -134,7 +143,9 @@ def _shape(shape: Shape, units: Units) -> InlineTable:
         case Mesh(path, scale):
             content = {"mesh": path}
             if scale != UNSCALED:
-                content["scale"] = _entry(scale[0]) if scale[0] == scale[1] == scale[2] else _entries(scale)
+                content["scale"] = (
+                    _entry(scale[0]) if scale[0] == scale[1] == scale[2] else _entries(scale)
+                )
         case Box(size):
             content = {"box": _entries(size, units.metres)}
         case Sphere(radius):
@@ -168,7 +179,9 @@ def _entry(value: Expression, unit: Expression = ONE) -> Item:
     if bare is None or "/" in text:
         written = value.text if value.written is None else text
         # In a table of mm a number in quotes could be taken for mm: in parentheses it is an expression, in metres.
-        return tomlkit.item(f"({written})" if unit != ONE and has_numbers_alone(written) else written)
+        return tomlkit.item(
+            f"({written})" if unit != ONE and has_numbers_alone(written) else written
+        )
     if bare.denominator == 1 and "e" not in text:
         return tomlkit.integer(text)
     # tomlkit.float_ would print the nearest double; this keeps all digits.

@@ -51,4 +51,6 @@ def expressions_in(value: object) -> Iterator[Expression]:
 
 def names_in(value: object) -> frozenset[str]:
     """Return the names of the parameters in a value."""
-    return frozenset(chain.from_iterable(expression.symbols for expression in expressions_in(value)))
+    return frozenset(
+        chain.from_iterable(expression.symbols for expression in expressions_in(value))
+    )

@@ -23,7 +23,9 @@ NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\-]{{0,{BOUNDS.name_characters - 1}}}"
 BODY_NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\- ]{{0,{BOUNDS.name_characters - 1}}}", re.ASCII)
 RESERVED_NAME = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of links and fixed joints of our URDFs: a joint of the same name would confuse Pinocchio."""
-_CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+_CONTROL_CHARACTER = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
 """Characters that XML may not hold or that a terminal would act on."""
 SHAPE_LEFT_OUT = "; this shape is left out"
 """End of a line of notes on a shape of the file that a description comes from, which the description does not have."""
@@ -73,7 +75,9 @@ def check(description: RobotData) -> tuple[str, ...]:
     _check_names(description)
     for key in ("source", "notes"):
         if control := _CONTROL_CHARACTER.search(getattr(description, key)):
-            raise DescriptionError(f"{key}: holds the control character {control.group()!r}; expected plain text")
+            raise DescriptionError(
+                f"{key}: holds the control character {control.group()!r}; expected plain text"
+            )
     base = description.base
     tool = description.tool
     for part, placed in (("base", base), ("tool", tool)):
@@ -99,7 +103,9 @@ def _number(where: str, expression: Expression, values: Mapping[str, Expression]
     except ExpressionError as error:
         raise DescriptionError(f"{where}: {str(error)[: BOUNDS.message_characters]}") from None
     if abs(number) > BOUNDS.number:
-        raise DescriptionError(f"{where}: {number:.3g} in SI units; expected at most {BOUNDS.number:g}")
+        raise DescriptionError(
+            f"{where}: {number:.3g} in SI units; expected at most {BOUNDS.number:g}"
+        )
     return number
 
 
@@ -112,27 +118,40 @@ def _check_names(description: RobotData) -> None:
         if not NAME.fullmatch(name):
             raise DescriptionError(f"joint {i}: name {name[:80]!r}; {expected}")
         if RESERVED_NAME.fullmatch(name):
-            raise DescriptionError(f"joint {i}: name {name!r} is taken by a frame of the URDF; choose another")
+            raise DescriptionError(
+                f"joint {i}: name {name!r} is taken by a frame of the URDF; choose another"
+            )
         if name in names[: i - 1]:
             raise DescriptionError(f"joint {i}: name {name!r} is another joint's already")
 
 
 def _check_joint(joint: Joint, where: str, value: _Value) -> Iterator[str]:
-    row = {key: value(f"{where}: {key}", getattr(joint, key)) for key in ("a", "alpha", "d", "theta")}
+    row = {
+        key: value(f"{where}: {key}", getattr(joint, key)) for key in ("a", "alpha", "d", "theta")
+    }
     angles = [(key, row[key], _MAX_TABLE_ANGLE) for key in ("alpha", "theta")]
     if joint.limits is not None:
-        lower, upper = (value(f"{where}: limits[{i}]", limit) for i, limit in enumerate(joint.limits))
+        lower, upper = (
+            value(f"{where}: limits[{i}]", limit) for i, limit in enumerate(joint.limits)
+        )
         if lower > upper:
-            raise DescriptionError(f"{where}: limits [{lower:g}, {upper:g}] are the wrong way round")
+            raise DescriptionError(
+                f"{where}: limits [{lower:g}, {upper:g}] are the wrong way round"
+            )
         if joint.is_revolute:
-            angles += [("lower limit", lower, _MAX_LIMIT_ANGLE), ("upper limit", upper, _MAX_LIMIT_ANGLE)]
+            angles += [
+                ("lower limit", lower, _MAX_LIMIT_ANGLE),
+                ("upper limit", upper, _MAX_LIMIT_ANGLE),
+            ]
     for key, angle, most in angles:
         if most < abs(angle) <= _MAX_DEGREES:
             yield f"{where}: {key} is {angle:.6g} rad, {abs(angle) / math.tau:.3g} turns; are angles in degrees?"
     for key, unit in (("velocity", "rad/s or m/s"), ("effort", "N m or N")):
         limit = getattr(joint, key)
         if limit is not None and not value(f"{where}: {key}", limit) > 0:
-            raise DescriptionError(f"{where}: {key} is {limit}; expected a positive number of {unit}")
+            raise DescriptionError(
+                f"{where}: {key} is {limit}; expected a positive number of {unit}"
+            )
     if joint.drive is not None:
         _check_drive(joint.drive, where, value)
     _check_body_names(joint.bodies, where)
@@ -159,12 +178,18 @@ def _check_body_names(bodies: Sequence[Body], where: str) -> None:
 
 def _check_drive(drive: Drive, where: str, value: _Value) -> None:
     if value(f"{where}: drive.gear", drive.gear) == 0:
-        raise DescriptionError(f"{where}: drive.gear is 0; expected the ratio of motor to joint speed")
+        raise DescriptionError(
+            f"{where}: drive.gear is 0; expected the ratio of motor to joint speed"
+        )
     for key, unit in (("rotor_inertia", "kg m^2"), ("viscous", "N m s/rad")):
         number = value(f"{where}: drive.{key}", getattr(drive, key))
         if number < 0:
-            raise DescriptionError(f"{where}: drive.{key} is {number:g} {unit}; expected none below 0")
-    positive, negative = (value(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(drive.coulomb))
+            raise DescriptionError(
+                f"{where}: drive.{key} is {number:g} {unit}; expected none below 0"
+            )
+    positive, negative = (
+        value(f"{where}: drive.coulomb[{i}]", entry) for i, entry in enumerate(drive.coulomb)
+    )
     if positive < 0 or negative > 0:
         raise DescriptionError(
             f"{where}: drive.coulomb is [{positive:g}, {negative:g}] N m; expected [not negative, not positive]"
@@ -173,12 +198,16 @@ def _check_drive(drive: Drive, where: str, value: _Value) -> None:
 
 def _check_couplings(description: RobotData, value: _Value) -> Iterator[str]:
     pairs: set[tuple[int, int]] = set()
-    armature = [value("drive", joint.drive.armature) if joint.drive else 0.0 for joint in description.joints]
+    armature = [
+        value("drive", joint.drive.armature) if joint.drive else 0.0 for joint in description.joints
+    ]
     for k, coupling in enumerate(description.couplings):
         where = f"coupling[{k}]"
         i, j = coupling.joints
         if not 1 <= i < j <= description.n:
-            raise DescriptionError(f"{where}: joints [{i}, {j}]; expected two joints of 1 to {description.n}")
+            raise DescriptionError(
+                f"{where}: joints [{i}, {j}]; expected two joints of 1 to {description.n}"
+            )
         if (i, j) in pairs:
             raise DescriptionError(f"{where}: joints {i} and {j} have a coupling already")
         pairs.add((i, j))
@@ -201,7 +230,9 @@ def _check_body(body: Body, where: str, value: _Value) -> Iterator[str]:
     lowest, middle, largest = _principal_moments(body, where, value)
     tolerance = eigenvalue_tolerance(largest)
     if lowest < -tolerance:
-        message = f"{where}: body.inertia has the eigenvalue {lowest:.6g} kg m^2; expected none below 0"
+        message = (
+            f"{where}: body.inertia has the eigenvalue {lowest:.6g} kg m^2; expected none below 0"
+        )
         if not body.unphysical:
             raise DescriptionError(message)
         yield message
@@ -250,14 +281,18 @@ def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None
     list(_check_body(body, where, lambda place, expression: _number(place, expression, values)))
 
 
-def _check_shapes(shapes: tuple[Shape, ...], where: str, value: _Value, description: RobotData) -> Iterator[str]:
+def _check_shapes(
+    shapes: tuple[Shape, ...], where: str, value: _Value, description: RobotData
+) -> Iterator[str]:
     if len(shapes) > BOUNDS.shapes:
         raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {BOUNDS.shapes}")
     for shape in shapes:
         _check_placement(shape.placement, f"{where}: shape.", value)
         _check_placement(shape.frame, f"{where}: shape.frame.", value)
         if shape.color is not None and not _COLOR.fullmatch(shape.color):
-            raise DescriptionError(f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'")
+            raise DescriptionError(
+                f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'"
+            )
         if isinstance(shape.geometry, Mesh):
             yield from _check_mesh(shape.geometry, f"{where}: shape", value, description)
         else:
@@ -279,16 +314,24 @@ def _check_mesh(mesh: Mesh, where: str, value: _Value, description: RobotData) -
     """Refuse an invalid path or scale; a file that is not a mesh is a warning, for the arm works without it."""
     file = inside(description.mesh_folder, mesh.path, f"{where}.mesh")
     if not mesh.path.lower().endswith(MESH_FORMATS):
-        raise DescriptionError(f"{where}.mesh is {mesh.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
+        raise DescriptionError(
+            f"{where}.mesh is {mesh.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}"
+        )
     for i, entry in enumerate(mesh.scale):
         if value(f"{where}.scale[{i}]", entry) == 0:
-            raise DescriptionError(f"{where}.scale[{i}] is 0; expected a factor to metres, negative to mirror")
+            raise DescriptionError(
+                f"{where}.scale[{i}] is 0; expected a factor to metres, negative to mirror"
+            )
     if file is None:
         return
     try:
         check_mesh_file(file)
     except MeshFileError as error:
-        fault = "is not there" if not file.exists() else f"is not a mesh that can be read ({error.reason})"
+        fault = (
+            "is not there"
+            if not file.exists()
+            else f"is not a mesh that can be read ({error.reason})"
+        )
         yield f"{where}.mesh: {mesh.path!r} {fault}; the link is drawn without it"
 
 
@@ -297,7 +340,9 @@ def _check_configurations(description: RobotData, value: _Value) -> Iterator[str
         if not NAME.fullmatch(name):
             raise DescriptionError(f"configurations: {name[:80]!r} is not a name")
         if len(q) != description.n:
-            raise DescriptionError(f"configurations.{name}: {len(q)} numbers; expected {description.n}, one a joint")
+            raise DescriptionError(
+                f"configurations.{name}: {len(q)} numbers; expected {description.n}, one a joint"
+            )
         for i, (entry, joint) in enumerate(zip(q, description.joints, strict=True)):
             number = value(f"configurations.{name}[{i}]", entry)
             if joint.limits is None:

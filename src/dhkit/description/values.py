@@ -94,7 +94,11 @@ class Coupling:
     """b: kg m^2 of two revolute joints, kg m of a revolute and a prismatic one, kg of two prismatic ones; any sign."""
 
     def __repr__(self) -> str:
-        return repr_line("Coupling", "", f"joints {self.joints[0]} and {self.joints[1]}, {self.inertia} in SI units")
+        return repr_line(
+            "Coupling",
+            "",
+            f"joints {self.joints[0]} and {self.joints[1]}, {self.inertia} in SI units",
+        )
 
 
 @dataclass(frozen=True)
@@ -105,7 +109,9 @@ class Placement:
     rpy: Vector = ORIGIN
 
     def __repr__(self) -> str:
-        return repr_line("Placement", "", f"xyz {vector_text(self.xyz)} m, rpy {vector_text(self.rpy)} rad")
+        return repr_line(
+            "Placement", "", f"xyz {vector_text(self.xyz)} m, rpy {vector_text(self.rpy)} rad"
+        )
 
 
 @dataclass(frozen=True)
@@ -211,7 +217,10 @@ class Joint:
 
     def __post_init__(self) -> None:
         if len(self.bodies) > 1:
-            named = (body if body.name else replace(body, name=f"body {k}") for k, body in enumerate(self.bodies, 1))
+            named = (
+                body if body.name else replace(body, name=f"body {k}")
+                for k, body in enumerate(self.bodies, 1)
+            )
             object.__setattr__(self, "bodies", tuple(named))
 
     @cached_property
@@ -254,4 +263,6 @@ class Tool:
 
 
 def _placed_repr(kind: str, placement: Placement, shapes: tuple[Shape, ...]) -> str:
-    return repr_line(kind, "", f"at {vector_text(placement.xyz)} m, {counted(len(shapes), 'shape')}")
+    return repr_line(
+        kind, "", f"at {vector_text(placement.xyz)} m, {counted(len(shapes), 'shape')}"
+    )

@@ -1,12 +1,22 @@
 """Dynamics of an arm: inverse and forward dynamics, their terms, energies and friction, on batches."""
 
 from dhkit.dynamics.energy import kinetic_energy, potential_energy, power
-from dhkit.dynamics.equations import bias, coriolis_matrix, gravity_torque, inverse_dynamics, mass_matrix
+from dhkit.dynamics.equations import (
+    bias,
+    coriolis_matrix,
+    gravity_torque,
+    inverse_dynamics,
+    mass_matrix,
+)
 from dhkit.dynamics.forward import forward_dynamics, require_inertia
 from dhkit.dynamics.loads import friction_torque, wrench_torque
 from dhkit.dynamics.programs import dynamic_kernels, dynamics_graph
 from dhkit.dynamics.regressor import inertial_parameters, regressor
-from dhkit.dynamics.velocity_regressor import ParameterGrouping, parameter_grouping, velocity_regressor
+from dhkit.dynamics.velocity_regressor import (
+    ParameterGrouping,
+    parameter_grouping,
+    velocity_regressor,
+)
 from dhkit.symbolic import Friction
 
 __all__ = [

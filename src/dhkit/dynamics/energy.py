@@ -12,7 +12,11 @@ from dhkit.kernels import result_array
 
 @takes_robot
 def kinetic_energy(
-    description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    out: Array | None = None,
+    threads: int = 1,
 ) -> Array:
     """Return the kinetic energy, rotors of the drives included.
 
@@ -39,7 +43,9 @@ def kinetic_energy(
 
 
 @takes_robot
-def potential_energy(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+def potential_energy(
+    description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
     """Return the potential energy of the moving links in gravity, shape (...), J; arguments as for ``mass_matrix``.
 
     It is 0 for a mass at the world's origin: V = -sum(m g . c).
@@ -48,7 +54,9 @@ def potential_energy(description: Description, q: ArrayLike, out: Array | None =
 
 
 @takes_robot
-def power(description: Description, qd: ArrayLike, tau: ArrayLike, out: Array | None = None) -> Array:
+def power(
+    description: Description, qd: ArrayLike, tau: ArrayLike, out: Array | None = None
+) -> Array:
     """Return the mechanical power of the joints, qd . tau, shape (...), W; qd and tau (..., n) broadcast.
 
     Raises

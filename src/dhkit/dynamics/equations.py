@@ -12,7 +12,9 @@ from dhkit.symbolic import Friction
 
 
 @takes_robot
-def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+def mass_matrix(
+    description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
     """Return the joint-space mass matrix M(q), drives' rotor inertia included.
 
     Parameters
@@ -38,12 +40,18 @@ def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None
     ValueError, TypeError
         q has not shape (..., n) or is not numeric; ``out`` does not fit.
     """
-    return evaluate("mass_matrix", description, {"q": q}, (description.n, description.n), out, threads)
+    return evaluate(
+        "mass_matrix", description, {"q": q}, (description.n, description.n), out, threads
+    )
 
 
 @takes_robot
 def coriolis_matrix(
-    description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    out: Array | None = None,
+    threads: int = 1,
 ) -> Array:
     """Return the Coriolis matrix C(q, qd) by Christoffel symbols, shape (..., n, n): dM/dt - 2 C is skew-symmetric.
 
@@ -64,13 +72,21 @@ def coriolis_matrix(
 
 
 @takes_robot
-def gravity_torque(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+def gravity_torque(
+    description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
     """Return g(q), shape (..., n), N m and N: torques that hold the arm; arguments as for :func:`mass_matrix`."""
     return evaluate("gravity_torque", description, {"q": q}, (description.n,), out, threads)
 
 
 @takes_robot
-def bias(description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+def bias(
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
     """Return C(q, qd) qd + g(q), shape (..., n), N m and N; arguments as for :func:`coriolis_matrix`."""
     return evaluate("bias", description, {"q": q, "qd": qd}, (description.n,), out, threads)
 

@@ -55,11 +55,20 @@ def friction_torque(
     state = joint_array(description, qd, "qd")
     width = Friction().width if friction is None else friction.width
     run = friction_kernel(description.n, width > 0)
-    return fill(run, friction_parameters(description.numbers, width), [state], (description.n,), out, threads)
+    return fill(
+        run,
+        friction_parameters(description.numbers, width),
+        [state],
+        (description.n,),
+        out,
+        threads,
+    )
 
 
 @takes_robot
-def wrench_torque(description: Description, q: ArrayLike, wrench: ArrayLike, threads: int = 1) -> Array:
+def wrench_torque(
+    description: Description, q: ArrayLike, wrench: ArrayLike, threads: int = 1
+) -> Array:
     """Return J^T w, shape (..., n): the torques with which a wrench on the tool drives the joints.
 
     Parameters
@@ -82,7 +91,9 @@ def wrench_torque(description: Description, q: ArrayLike, wrench: ArrayLike, thr
     if load.ndim == 0 or load.shape[-1] != 6:
         raise ValueError(f"wrench has shape {load.shape}; expected (..., 6): force, then moment")
     run, parameters = wrench_kernel(description)
-    return fill(run, parameters, [joint_array(description, q), load], (description.n,), None, threads)
+    return fill(
+        run, parameters, [joint_array(description, q), load], (description.n,), None, threads
+    )
 
 
 def external_torque(
@@ -135,4 +146,6 @@ def _wrench_graph(description: Description) -> Graph:
     q = joint_symbols("q", description.n)
     wrench = joint_symbols("wrench", 6)
     tau = jacobian(table, q).T @ wrench
-    return Graph.of("wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": tau})
+    return Graph.of(
+        "wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": tau}
+    )

@@ -46,7 +46,9 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
     n = description.n
     prismatic = description.numbers.prismatic
     q, qd, qdd = np.broadcast_arrays(
-        joint_array(description, q, "q"), joint_array(description, qd, "qd"), joint_array(description, qdd, "qdd")
+        joint_array(description, q, "q"),
+        joint_array(description, qd, "qd"),
+        joint_array(description, qdd, "qdd"),
     )
     frames = np.moveaxis(world_to_frames(description, q), -3, 0)
     origins = frames[..., :3, 3]

@@ -167,7 +167,9 @@ def dry_friction_bounds(numbers: Numbers, width: float, least_speed: Array, moti
     c_pos, c_neg = numbers.coulomb.T
     size = np.abs(c_pos - c_neg) / 2 + np.abs(c_pos + c_neg)
     r = np.hypot(1.0, least_speed / width)
-    f1, f2, f3, f4 = (size * c / (width**k * r ** (k + 2)) for k, c in enumerate(_FRICTION_FACTORS, start=1))
+    f1, f2, f3, f4 = (
+        size * c / (width**k * r ** (k + 2)) for k, c in enumerate(_FRICTION_FACTORS, start=1)
+    )
 
     # d^4 f(v(t)) / dt^4 = f4 v'^4 + 6 f3 v'^2 v'' + f2 (3 v''^2 + 4 v' v''') + f1 v'''' (Faa di Bruno)
     v1, v2, v3, v4 = motion[2:6]

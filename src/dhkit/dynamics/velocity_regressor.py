@@ -90,7 +90,11 @@ def _graph(description: Description) -> Graph:
     gravity = joint_symbols("gravity", 3)
     states = {name: joint_symbols(name, description.n) for name in ("q", "qd", "qd_r", "qdd_r")}
     Y = velocity_regressor_expression(table, (gravity[0], gravity[1], gravity[2]), *states.values())
-    return Graph.of("velocity_regressor", {"parameters": casadi.vertcat(parameters, gravity), **states}, {"Y": Y})
+    return Graph.of(
+        "velocity_regressor",
+        {"parameters": casadi.vertcat(parameters, gravity), **states},
+        {"Y": Y},
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +115,9 @@ class ParameterGrouping:
 
     def __repr__(self) -> str:
         columns = ", ".join(map(str, self.columns))
-        return repr_line("ParameterGrouping", counted(len(self), "base parameter"), f"columns {columns}")
+        return repr_line(
+            "ParameterGrouping", counted(len(self), "base parameter"), f"columns {columns}"
+        )
 
 
 @takes_robot

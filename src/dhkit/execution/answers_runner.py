@@ -179,8 +179,14 @@ class Symbolic:
         names = {name: name for name in ELEMENTARY.split()} | INVERSES
         for name, own in names.items():
             self._add_method(name, getattr(self.sympy, own))
-            for math_name in {name, own} & set(dir(math)):  # math has asin, as sympy has, and not arcsin
-                setattr(math, math_name, self._of_symbols(getattr(math, math_name), getattr(self.sympy, own)))
+            for math_name in {name, own} & set(
+                dir(math)
+            ):  # math has asin, as sympy has, and not arcsin
+                setattr(
+                    math,
+                    math_name,
+                    self._of_symbols(getattr(math, math_name), getattr(self.sympy, own)),
+                )
         self._add_method("deg2rad", self.sympy.rad)
         self._add_method("rad2deg", self.sympy.deg)
         for name in ("zeros", "ones", "eye", "identity", "empty") if self.numpy is not None else ():
@@ -190,11 +196,15 @@ class Symbolic:
         if not hasattr(self.sympy.Expr, name):
             setattr(self.sympy.Expr, name, lambda self, *others: function(self, *others))
 
-    def _of_symbols(self, of_numbers: Callable[..., Any], function: Callable[..., Any]) -> Callable[..., Any]:
+    def _of_symbols(
+        self, of_numbers: Callable[..., Any], function: Callable[..., Any]
+    ) -> Callable[..., Any]:
         Basic = self.sympy.Basic
 
         def either(*arguments: Any) -> Any:
-            return (function if any(isinstance(x, Basic) for x in arguments) else of_numbers)(*arguments)
+            return (function if any(isinstance(x, Basic) for x in arguments) else of_numbers)(
+                *arguments
+            )
 
         return either
 
@@ -327,10 +337,17 @@ class ExecutedFile:
         """Return the answer to a request."""
         if "value" in request:
             writer = Writer()
-            return {"tree": writer.tree(self.namespace[request["value"]]), "definitions": writer.definitions}
+            return {
+                "tree": writer.tree(self.namespace[request["value"]]),
+                "definitions": writer.definitions,
+            }
         function = self.namespace[request["call"]]
         if "samples" in request:
-            return {"values": [self._sampled(function, one, request["local"]) for one in request["samples"]]}
+            return {
+                "values": [
+                    self._sampled(function, one, request["local"]) for one in request["samples"]
+                ]
+            }
         with self.symbolic.calculating():
             arguments = [self._symbols(x, request["as"]) for x in request["arguments"].values()]
             value, local_values = called(function, arguments)
@@ -353,7 +370,9 @@ class ExecutedFile:
             return vector([symbol(name) for name in names])
         return Parameters(symbol) if isinstance(names, dict) else symbol(names)
 
-    def _sampled(self, function: Callable[..., Any], arguments: Mapping[str, Any], local: str) -> object:
+    def _sampled(
+        self, function: Callable[..., Any], arguments: Mapping[str, Any], local: str
+    ) -> object:
         """Return the numbers that a function returns, or those of one of its local names; None where not finite."""
         np = self.symbolic.numpy
         value, local_values = called(function, [self._numbers(x) for x in arguments.values()])
@@ -363,7 +382,9 @@ class ExecutedFile:
         if array.dtype.kind == "O":
             is_real = all(isinstance(x, numbers.Real) for x in array.ravel().tolist())
         if not is_real:
-            raise TypeError(f"returned {type(sampled).__name__} of {array.dtype}; expected real numbers")
+            raise TypeError(
+                f"returned {type(sampled).__name__} of {array.dtype}; expected real numbers"
+            )
         array = array.astype(float)
         return np.where(np.isfinite(array), array.astype(object), None).tolist()
 
@@ -437,7 +458,11 @@ class Writer:
             return [self._tree(entry) for entry in value]
         if isinstance(value, dict | SimpleNamespace):
             fields = value if isinstance(value, dict) else vars(value)
-            return {"fields": {name: self.tree(one) for name, one in fields.items() if isinstance(name, str)}}
+            return {
+                "fields": {
+                    name: self.tree(one) for name, one in fields.items() if isinstance(name, str)
+                }
+            }
         # sympy's numbers are numbers.Real too.
         if isinstance(value, numbers.Real | Fraction) and not hasattr(value, "free_symbols"):
             return self._counted(number_text(value))
@@ -480,7 +505,9 @@ class Writer:
         import casadi
 
         if isinstance(value, casadi.DM):
-            return rows_of(value.shape, [self._counted(number_text(float(x))) for x in value.full().ravel("F")])
+            return rows_of(
+                value.shape, [self._counted(number_text(float(x))) for x in value.full().ravel("F")]
+            )
         if isinstance(value, casadi.MX):
             symbols = casadi.symvar(value)
             expanded = casadi.Function("f", symbols, [value]).expand()
@@ -488,7 +515,9 @@ class Writer:
         if not isinstance(value, casadi.SX):
             raise TypeError(f"found casadi.{type(value).__name__}; expected SX, MX or DM")
         dense = casadi.densify(value)
-        return rows_of(value.shape, [self._counted(self._casadi_text(entry)) for entry in dense.elements()])
+        return rows_of(
+            value.shape, [self._counted(self._casadi_text(entry)) for entry in dense.elements()]
+        )
 
     def _casadi_text(self, root: Any) -> str:
         """Return a CasADi scalar as text; a subexpression used several times becomes a definition."""

@@ -16,7 +16,13 @@ PACKAGE_FOLDER = Path("/packages")
 RUNNERS = Path("/runners")
 """Folder of dhkit's files that are executed in the program's process."""
 _SYSTEM_FOLDERS = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin")
-_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/octave", "/etc/fonts", "/etc/localtime")
+_SYSTEM_FILES = (
+    "/etc/ld.so.cache",
+    "/etc/alternatives",
+    "/etc/octave",
+    "/etc/fonts",
+    "/etc/localtime",
+)
 """Files that programs of the system read: Octave finds its linear algebra by /etc/alternatives."""
 _FOLDER_BYTES = 64 << 20
 """Size of each folder that a program may write to, bytes."""
@@ -29,14 +35,21 @@ def base_python() -> str:
 
 def bubblewrap(packages: tuple[str, ...]) -> list[str]:
     """Return bubblewrap with the listed mounts."""
-    size = ("--size", str(_FOLDER_BYTES))
     return [
         *("bwrap", "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"),
         *_system_mounts(),
         *read_only(package_paths(packages)),
-        *("--dev", "/dev", *size, "--tmpfs", "/dev/shm", *size, "--tmpfs", "/tmp", *size, "--tmpfs", str(HOME)),  # noqa: S108
+        *("--dev", "/dev"),
+        *_memory_folder("/dev/shm"),  # noqa: S108 - inside the sandbox
+        *_memory_folder("/tmp"),  # noqa: S108
+        *_memory_folder(str(HOME)),
         *("--proc", "/proc"),
     ]
+
+
+def _memory_folder(path: str) -> tuple[str, ...]:
+    """Return the options for an empty folder in memory, of bounded size."""
+    return ("--size", str(_FOLDER_BYTES), "--tmpfs", path)
 
 
 def _system_mounts() -> Iterator[str]:
@@ -87,7 +100,9 @@ def package_paths(names: tuple[str, ...]) -> dict[Path, Path]:
             distribution = metadata.distribution(name)
             requirements = distribution.requires or ()
             # Requirements of extras and other systems follow a semicolon.
-            waiting += [_name_of(requirement) for requirement in requirements if ";" not in requirement]
+            waiting += [
+                _name_of(requirement) for requirement in requirements if ";" not in requirement
+            ]
             for top in {file.parts[0] for file in distribution.files or ()}:
                 if top not in ("..", "bin", "__pycache__", "cmeel.prefix"):
                     outside = Path(str(distribution.locate_file(top)))
@@ -98,5 +113,8 @@ def package_paths(names: tuple[str, ...]) -> dict[Path, Path]:
 
 def _name_of(requirement: str) -> str:
     """Return the package of a requirement such as ``mpmath<1.4,>=1.1``."""
-    end = next((k for k, letter in enumerate(requirement) if not (letter.isalnum() or letter in "-_.")), None)
+    end = next(
+        (k for k, letter in enumerate(requirement) if not (letter.isalnum() or letter in "-_.")),
+        None,
+    )
     return requirement[:end]

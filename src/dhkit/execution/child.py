@@ -12,7 +12,15 @@ from pathlib import Path
 from dhkit.execution.bounds import BOUNDS
 from dhkit.execution.isolated_commands import folder_inside, python_command, runner_inside
 from dhkit.execution.isolation import Isolation
-from dhkit.execution.process import HERE, CallTime, Failure, Limits, Process, ProgramError, printable
+from dhkit.execution.process import (
+    HERE,
+    CallTime,
+    Failure,
+    Limits,
+    Process,
+    ProgramError,
+    printable,
+)
 
 FUNCTION_RUNNERS = {".py": "python_runner.py", ".m": "octave_runner.m"}
 """Runners that call a file's functions with numbers."""
@@ -41,7 +49,11 @@ class Child:
     """
 
     def __init__(
-        self, source: Path | Sequence[str], runners: Mapping[str, str], limits: Limits, isolation: Isolation
+        self,
+        source: Path | Sequence[str],
+        runners: Mapping[str, str],
+        limits: Limits,
+        isolation: Isolation,
     ) -> None:
         if os.name != "posix":
             raise ProgramError("programs run on Linux and macOS alone", Failure.UNREADABLE)
@@ -69,7 +81,9 @@ class Child:
             self._running_process()
             return self.first
 
-    def ask(self, request: Mapping[str, object], seconds: float | None = None) -> Mapping[str, object]:
+    def ask(
+        self, request: Mapping[str, object], seconds: float | None = None
+    ) -> Mapping[str, object]:
         """Return the answer to a request.
 
         Parameters
@@ -142,7 +156,9 @@ class Child:
         if self._closed:  # meanwhile, by another thread, which has not seen this process
             self._end()
             raise ProgramError(f"{self.name} was closed", Failure.ENDED)
-        first = self._read_until(running, BOUNDS.start_time, lambda answer: "functions" in answer or "error" in answer)
+        first = self._read_until(
+            running, BOUNDS.start_time, lambda answer: "functions" in answer or "error" in answer
+        )
         if "error" in first:
             self._end()
             raise ProgramError(_error_text(first), Failure.UNREADABLE, _error_line(first))
@@ -195,19 +211,26 @@ class Child:
             if not source.is_file():
                 raise ProgramError(f"{source}: expected a file", Failure.UNREADABLE)
             if source.stat().st_size > BOUNDS.source_bytes:
-                raise ProgramError(f"{source}: expected at most {BOUNDS.source_bytes} bytes", Failure.UNREADABLE)
+                raise ProgramError(
+                    f"{source}: expected at most {BOUNDS.source_bytes} bytes", Failure.UNREADABLE
+                )
             (folder / source.name).write_bytes(source.read_bytes())
         except OSError as error:
             raise ProgramError(f"{source}: {error.strerror}", Failure.UNREADABLE) from None
         runner = self._runners.get(source.suffix)
         if runner is None:
-            raise ProgramError(f"{source}: expected a {' or '.join(self._runners)} file", Failure.UNREADABLE)
+            raise ProgramError(
+                f"{source}: expected a {' or '.join(self._runners)} file", Failure.UNREADABLE
+            )
         inside = str(folder_inside(self.isolation, folder) / source.name)
         if source.suffix == ".py":
             return [*python_command(self.isolation, HERE / runner, folder), inside]
         octave = shutil.which("octave-cli") or shutil.which("octave")
         if octave is None:
-            raise ProgramError(f"{source.name}: GNU Octave, which runs .m files, is not installed", Failure.UNREADABLE)
+            raise ProgramError(
+                f"{source.name}: GNU Octave, which runs .m files, is not installed",
+                Failure.UNREADABLE,
+            )
         script = str(runner_inside(self.isolation, HERE / runner, folder))
         return [octave, "--no-gui", "--quiet", "--norc", "--no-history", script, inside]
 
@@ -220,4 +243,8 @@ def _error_text(answer: Mapping[str, object]) -> str:
 def _error_line(answer: Mapping[str, object]) -> int | None:
     """Return the line of the source that an answer names; None where it names none."""
     line = answer.get("line")
-    return line if isinstance(line, int) and not isinstance(line, bool) and 0 < line < BOUNDS.line_number else None
+    return (
+        line
+        if isinstance(line, int) and not isinstance(line, bool) and 0 < line < BOUNDS.line_number
+        else None
+    )

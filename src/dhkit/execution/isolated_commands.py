@@ -6,7 +6,15 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from dhkit.execution.bubblewrap import HOME, PACKAGE_FOLDER, RUNNERS, base_python, bubblewrap, package_paths, read_only
+from dhkit.execution.bubblewrap import (
+    HOME,
+    PACKAGE_FOLDER,
+    RUNNERS,
+    base_python,
+    bubblewrap,
+    package_paths,
+    read_only,
+)
 from dhkit.execution.isolation import Isolation, Kind
 
 _HERE = Path(__file__).parent
@@ -37,7 +45,15 @@ def python_command(isolation: Isolation, runner: Path, folder: Path) -> list[str
         packages.mkdir()
         for outside, inside in package_paths(isolation.packages).items():
             (packages / inside.name).symlink_to(outside)
-    return [base_python(), "-I", "-S", "-B", "-u", str(runner_inside(isolation, runner, folder)), str(packages)]
+    return [
+        base_python(),
+        "-I",
+        "-S",
+        "-B",
+        "-u",
+        str(runner_inside(isolation, runner, folder)),
+        str(packages),
+    ]
 
 
 def runner_inside(isolation: Isolation, path: Path, folder: Path) -> Path:
@@ -71,6 +87,16 @@ def isolated_command(
     if isolation.kind is not Kind.BUBBLEWRAP:
         return list(program)
     binds = {path: HOME / path.name for path in sorted(folder.iterdir())}
-    binds |= {path: RUNNERS / path.name for path in (*_HERE.glob("*_runner.py"), *_HERE.glob("*_runner.m"))}
+    binds |= {
+        path: RUNNERS / path.name
+        for path in (*_HERE.glob("*_runner.py"), *_HERE.glob("*_runner.m"))
+    }
     binds |= {path.resolve(): path for path in shown}
-    return [*bubblewrap(isolation.packages), *read_only(binds), "--chdir", str(HOME), "--", *program]
+    return [
+        *bubblewrap(isolation.packages),
+        *read_only(binds),
+        "--chdir",
+        str(HOME),
+        "--",
+        *program,
+    ]

@@ -73,7 +73,9 @@ class IsolationError(DhkitError):
     """A program that must be isolated cannot be isolated on this system."""
 
 
-def find_isolation(hidden: Iterable[Path] = (), packages: Sequence[str] = (), *, required: bool = False) -> Isolation:
+def find_isolation(
+    hidden: Iterable[Path] = (), packages: Sequence[str] = (), *, required: bool = False
+) -> Isolation:
     """Return the best isolation that works on this system.
 
     Parameters
@@ -136,7 +138,9 @@ def _problem_of_bubblewrap(hidden: Sequence[str], packages: tuple[str, ...]) -> 
     """Return why bubblewrap isolates nothing here; empty where it does."""
     if shutil.which("bwrap") is None:
         return "bubblewrap is not installed (Debian: apt-get install bubblewrap)"
-    seen, error = _probe([*bubblewrap(packages), "--", base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden], 0)
+    seen, error = _probe(
+        [*bubblewrap(packages), "--", base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden], 0
+    )
     if error:
         return f"bubblewrap fails: {error}"
     return f"bubblewrap shows {seen[0]}, which lies among the files of the system" if seen else ""
@@ -144,7 +148,9 @@ def _problem_of_bubblewrap(hidden: Sequence[str], packages: tuple[str, ...]) -> 
 
 def _problem_of_user(hidden: Sequence[str], needed: Sequence[str]) -> str:
     """Return why another user does not isolate here, or cannot read the packages it needs; empty where it works."""
-    seen, error = _probe([base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden, *needed], FIRST_USER)
+    seen, error = _probe(
+        [base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden, *needed], FIRST_USER
+    )
     if error:
         return error
     for path in hidden:

@@ -151,13 +151,19 @@ class Process:
     """
 
     def __init__(
-        self, command: Callable[[Path], list[str]], limits: Limits, isolation: Isolation, shown: Iterable[Path] = ()
+        self,
+        command: Callable[[Path], list[str]],
+        limits: Limits,
+        isolation: Isolation,
+        shown: Iterable[Path] = (),
     ) -> None:
         self.failure: Failure | None = None
         self._limits = limits
         self._user = next_user() if isolation.kind is Kind.USER else 0
         self._has_own_root = isolation.kind is Kind.BUBBLEWRAP
-        self._folder = tempfile.TemporaryDirectory(prefix="dhkit-program-", ignore_cleanup_errors=True)
+        self._folder = tempfile.TemporaryDirectory(
+            prefix="dhkit-program-", ignore_cleanup_errors=True
+        )
         try:
             self._start(command, isolation, shown)
         except BaseException:
@@ -174,7 +180,9 @@ class Process:
         self._closed = threading.Event()
         self._count = 0
         self._threads = [
-            threading.Thread(target=work, name=f"dhkit-program-{work.__name__.strip('_')}", daemon=True)
+            threading.Thread(
+                target=work, name=f"dhkit-program-{work.__name__.strip('_')}", daemon=True
+            )
             for work in (self._receive, self._drain, self._watch)
         ]
         for thread in self._threads:
@@ -252,7 +260,9 @@ class Process:
             remove_files_of(self._user)
         self._folder.cleanup()
 
-    def _start(self, command: Callable[[Path], list[str]], isolation: Isolation, shown: Iterable[Path]) -> None:
+    def _start(
+        self, command: Callable[[Path], list[str]], isolation: Isolation, shown: Iterable[Path]
+    ) -> None:
         folder = Path(self._folder.name).resolve()
         program = isolated_command(isolation, command(folder), folder, shown)
         if self._user:
@@ -292,7 +302,9 @@ class Process:
             Failure.GARBAGE: "wrote something that is not an answer",
         }
         if self.failure is Failure.ENDED:
-            self._drained.wait(_LAST_WORDS_TIME)  # its last words may come after the news of its end
+            self._drained.wait(
+                _LAST_WORDS_TIME
+            )  # its last words may come after the news of its end
         lines = self.output().strip().splitlines() if self.failure is Failure.ENDED else []
         last_line = f": {printable(lines[-1])[:200]}" if lines else ""
         return ProgramError(texts[self.failure] + last_line, self.failure)
@@ -301,7 +313,9 @@ class Process:
         """Return the status or the signal that the program ended with, as text; empty if it still runs."""
         with suppress(subprocess.TimeoutExpired):
             status = self._process.wait(_EXIT_DELAY)
-            number = -status if status < 0 else status - 128  # bubblewrap tells a signal as a shell does
+            number = (
+                -status if status < 0 else status - 128
+            )  # bubblewrap tells a signal as a shell does
             if number > 0:
                 with suppress(ValueError):
                     return f" by {signal.Signals(number).name}"
@@ -354,7 +368,10 @@ class Process:
                 self._terminate(Failure.MEMORY)
             elif len(self._descendants) > MAX_PROCESSES:
                 self._terminate(Failure.PROCESSES)
-            elif _written_bytes(Path(self._folder.name), list(self._descendants)) > BOUNDS.written_bytes:
+            elif (
+                _written_bytes(Path(self._folder.name), list(self._descendants))
+                > BOUNDS.written_bytes
+            ):
                 self._terminate(Failure.FILES)
 
     def _find_descendants(self) -> None:

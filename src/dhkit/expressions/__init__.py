@@ -2,7 +2,17 @@
 
 from dhkit.expressions.budget import Budget
 from dhkit.expressions.exact import PI, PI_DIGITS, ZERO, Atom, Expression
-from dhkit.expressions.functions import FUNCTIONS, arc_tangent, call, cos, decimals, settled, sin, sqrt, substitute
+from dhkit.expressions.functions import (
+    FUNCTIONS,
+    arc_tangent,
+    call,
+    cos,
+    decimals,
+    settled,
+    sin,
+    sqrt,
+    substitute,
+)
 from dhkit.expressions.numbers import exact, exact_angle
 from dhkit.expressions.parser import CONSTANTS, parse
 from dhkit.expressions.syntax import decimal_fraction, read

@@ -58,7 +58,10 @@ class Atom:
         return self._hash
 
     def __reduce__(self) -> tuple[type[Atom], tuple[str, tuple[Expression, ...]]]:
-        return Atom, (self.name, self.arguments)  # without the cached hash, which differs from process to process
+        return Atom, (
+            self.name,
+            self.arguments,
+        )  # without the cached hash, which differs from process to process
 
     @property
     def is_symbol(self) -> bool:
@@ -81,7 +84,9 @@ class Atom:
             return self.arguments[0].value()
         arguments = [float(argument) for argument in self.arguments]
         try:
-            return Fraction(abs(*arguments) if self.name == "abs" else getattr(math, self.name)(*arguments))
+            return Fraction(
+                abs(*arguments) if self.name == "abs" else getattr(math, self.name)(*arguments)
+            )
         except (ValueError, OverflowError):
             raise ExpressionError(f"{self} is not a finite number") from None
 
@@ -140,7 +145,9 @@ class Expression:
         if atom.arguments:
             spend(len(atom.text) // 16)
             if len(atom.text) > BOUNDS.atom_characters:
-                raise ExpressionError(f"a function of more than {BOUNDS.atom_characters} characters")
+                raise ExpressionError(
+                    f"a function of more than {BOUNDS.atom_characters} characters"
+                )
         return cls(((((atom, 1),), Fraction(1)),))
 
     @classmethod
@@ -195,7 +202,8 @@ class Expression:
                 base = atom.value()
                 if exponent < 0 and (base == 0 or _is_rounding(atom, base)):
                     raise ExpressionError(
-                        f"{plain(self.text, _SHOWN_LENGTH)} divides by zero" + (", to rounding" if base else "")
+                        f"{plain(self.text, _SHOWN_LENGTH)} divides by zero"
+                        + (", to rounding" if base else "")
                     )
                 value *= _power(base, exponent)
             total += value
@@ -205,7 +213,9 @@ class Expression:
         try:
             return float(self.value())
         except OverflowError:
-            raise ExpressionError(f"{plain(self.text, _SHOWN_LENGTH)} is not a finite double") from None
+            raise ExpressionError(
+                f"{plain(self.text, _SHOWN_LENGTH)} is not a finite double"
+            ) from None
 
     @property
     def text(self) -> str:
@@ -213,7 +223,9 @@ class Expression:
         if not self.terms:
             return "0"
         first, *rest = (_term_text(monomial, coefficient) for monomial, coefficient in self.terms)
-        return first + "".join(f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in rest)
+        return first + "".join(
+            f" - {term[1:]}" if term.startswith("-") else f" + {term}" for term in rest
+        )
 
     def __str__(self) -> str:
         return self.written if self.written is not None else self.text
@@ -255,7 +267,11 @@ class Expression:
         total: dict[Monomial, Fraction] = {}
         unresolved = ZERO
         right = _expression(other).terms
-        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // _BITS_PER_WORK))
+        spend(
+            len(self.terms)
+            * len(right)
+            * (1 + (_bits(self.terms) + _bits(right)) // _BITS_PER_WORK)
+        )
         for left_monomial, left in self.terms:
             for right_monomial, coefficient in right:
                 monomial, factor = _merged(left_monomial, right_monomial)
@@ -350,7 +366,10 @@ def _collected(total: Mapping[Monomial, Fraction]) -> Expression:
     terms = [term for term in total.items() if term[1]]
     if len(terms) > BOUNDS.terms:
         raise ExpressionError(f"an expression of more than {BOUNDS.terms} terms")
-    if any(c.numerator.bit_length() + c.denominator.bit_length() > BOUNDS.coefficient_bits for _, c in terms):
+    if any(
+        c.numerator.bit_length() + c.denominator.bit_length() > BOUNDS.coefficient_bits
+        for _, c in terms
+    ):
         raise ExpressionError("a number too long to be kept exactly")
     return Expression(tuple(sorted(terms, key=_order) if len(terms) > 1 else terms))
 
@@ -377,7 +396,9 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
         if resolved:
             factor = (factor or Expression.number(1)) * atom.arguments[0] ** resolved
         powers[atom] = left_over
-    return tuple(sorted(((a, e) for a, e in powers.items() if e), key=lambda power: power[0].text)), factor
+    return tuple(
+        sorted(((a, e) for a, e in powers.items() if e), key=lambda power: power[0].text)
+    ), factor
 
 
 def _ratio(dividend: Expression, divisor: Expression) -> Fraction | None:
@@ -427,7 +448,9 @@ def _term_text(monomial: Monomial, coefficient: Fraction) -> str:
     if decimal is not None:
         numerator[:0] = [decimal] if not monomial or magnitude != 1 else []
     else:
-        numerator[:0] = [str(magnitude.numerator)] if magnitude.numerator != 1 or not numerator else []
+        numerator[:0] = (
+            [str(magnitude.numerator)] if magnitude.numerator != 1 or not numerator else []
+        )
         denominator[:0] = [str(magnitude.denominator)] if magnitude.denominator != 1 else []
     text = "*".join(numerator or ["1"]) + "".join(f"/{factor}" for factor in denominator)
     return f"-{text}" if coefficient < 0 else text

@@ -127,10 +127,14 @@ def call(function: str, *arguments: Expression) -> Expression:
         No such function, another number of arguments, or a value outside its domain.
     """
     if function not in FUNCTIONS:
-        raise ExpressionError(f"unknown function {function!r}; expected one of {', '.join(FUNCTIONS)}")
+        raise ExpressionError(
+            f"unknown function {function!r}; expected one of {', '.join(FUNCTIONS)}"
+        )
     count, meaning = FUNCTIONS[function]
     if len(arguments) != count:
-        raise ExpressionError(f"{function} takes {count} argument{'s' * (count > 1)}, found {len(arguments)}")
+        raise ExpressionError(
+            f"{function} takes {count} argument{'s' * (count > 1)}, found {len(arguments)}"
+        )
     return meaning(*arguments)
 
 
@@ -167,7 +171,11 @@ def decimals(expression: Expression) -> Expression:
     for monomial, coefficient in expression.terms:
         product = Expression.number(coefficient)
         for atom, exponent in monomial:
-            is_number = atom.arguments and atom.name != "sqrt" and not any(x.symbols for x in atom.arguments)
+            is_number = (
+                atom.arguments
+                and atom.name != "sqrt"
+                and not any(x.symbols for x in atom.arguments)
+            )
             base = _decimal(atom) if is_number else Expression.of_atom(atom)
             product = product * base**exponent
         total.append(product)
@@ -200,7 +208,10 @@ def _sine_of_steps(steps: int) -> Expression:
 
 
 def _inverse(
-    name: str, x: Expression, approximate: Callable[[float], float], exactly: Callable[[int], Expression]
+    name: str,
+    x: Expression,
+    approximate: Callable[[float], float],
+    exactly: Callable[[int], Expression],
 ) -> Expression:
     """Return an inverse function: resolved at multiples of 15 degrees, an atom elsewhere."""
     if not x.symbols:
@@ -229,7 +240,9 @@ def _direction(angle: Expression) -> tuple[Expression, Expression] | None:
     r = sqrt(x * x + y * y)
     c = x / r
     s = y * arcs[0][1] / r
-    return (c, s) if rest.is_zero else (c * cos(rest) - s * sin(rest), s * cos(rest) + c * sin(rest))
+    return (
+        (c, s) if rest.is_zero else (c * cos(rest) - s * sin(rest), s * cos(rest) + c * sin(rest))
+    )
 
 
 def _leads_negative(x: Expression) -> bool:

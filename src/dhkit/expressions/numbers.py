@@ -49,4 +49,8 @@ def exact_angle(value: Expression) -> Expression:
         return value
     step = round(number * STEPS_IN_PI / PI_DIGITS)
     candidate = PI * Fraction(step, STEPS_IN_PI)
-    return replace(candidate, written=value.written) if step and float(candidate) == float(number) else value
+    return (
+        replace(candidate, written=value.written)
+        if step and float(candidate) == float(number)
+        else value
+    )

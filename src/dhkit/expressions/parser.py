@@ -70,7 +70,9 @@ def value_of(tree: Tree, names: Collection[str]) -> Expression:
             for multiplied, factor in factors:
                 if not multiplied and isinstance(factor, Power):
                     # 1/(a + b)^2 is (1/(a + b))^2: a sum in a denominator is not multiplied out.
-                    product = product * _power(value_of(factor.base, names), -value_of(factor.exponent, names))
+                    product = product * _power(
+                        value_of(factor.base, names), -value_of(factor.exponent, names)
+                    )
                     continue
                 value = value_of(factor, names)
                 product = product * value if multiplied else product / value
@@ -83,7 +85,11 @@ def _named(text: str, names: Collection[str]) -> Expression:
     if text in CONSTANTS:
         return CONSTANTS[text]
     close = difflib.get_close_matches(text, [*names, *CONSTANTS], n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join([*names, *CONSTANTS][:12])}"
+    hint = (
+        f"did you mean {close[0]!r}?"
+        if close
+        else f"known are {', '.join([*names, *CONSTANTS][:12])}"
+    )
     raise ExpressionError(f"unknown name {text[:80]!r}; {hint}")
 
 
@@ -91,5 +97,7 @@ def _power(base: Expression, exponent: Expression) -> Expression:
     """Raise to a whole or half-whole power."""
     number = exponent.rational
     if number is None or number.denominator > 2:
-        raise ExpressionError(f"an exponent of {exponent.text}; expected a whole number or half of one")
+        raise ExpressionError(
+            f"an exponent of {exponent.text}; expected a whole number or half of one"
+        )
     return (base if number.denominator == 1 else sqrt(base)) ** number.numerator

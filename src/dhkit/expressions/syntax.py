@@ -24,7 +24,9 @@ from typing import NamedTuple, NoReturn, TypeAlias
 from dhkit.errors import ExpressionError
 from dhkit.expressions.bounds import BOUNDS
 
-_TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
+_TOKEN = re.compile(
+    r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII
+)
 
 
 _DECIMAL_DIGITS = 4_096
@@ -100,7 +102,9 @@ def read(text: str) -> Tree:
         The text is not an expression, or is longer or deeper than the limits of this module.
     """
     if len(text) > BOUNDS.characters:
-        raise ExpressionError(f"an expression of {len(text)} characters; expected at most {BOUNDS.characters}")
+        raise ExpressionError(
+            f"an expression of {len(text)} characters; expected at most {BOUNDS.characters}"
+        )
     return read_tokens(_tokens(text), text)
 
 
@@ -132,7 +136,11 @@ def decimal_fraction(text: str) -> Fraction:
     """
     mantissa, _, exponent = text.lower().partition("e")
     shown = text if len(text) <= 20 else f"{text[:17]}..."
-    if len(mantissa) > BOUNDS.digits or len(exponent) > 6 or abs(int(exponent or 0)) > BOUNDS.digits:
+    if (
+        len(mantissa) > BOUNDS.digits
+        or len(exponent) > 6
+        or abs(int(exponent or 0)) > BOUNDS.digits
+    ):
         raise ExpressionError(f"{shown} is beyond the range of a double")
     value = Fraction(text)
     try:
@@ -162,9 +170,13 @@ def _tokens(text: str) -> list[Token]:
         match = _TOKEN.match(text, at)
         if match is None:
             at += len(text[at:]) - len(text[at:].lstrip())
-            raise ExpressionError(f"{_shown(text)}: unexpected character {text[at]!r} at position {at + 1}")
+            raise ExpressionError(
+                f"{_shown(text)}: unexpected character {text[at]!r} at position {at + 1}"
+            )
         kind = ("number", "name", "sign")[(match.lastindex or 1) - 1]
-        tokens.append(Token(kind, match.group(match.lastindex or 1), match.start(match.lastindex or 1)))
+        tokens.append(
+            Token(kind, match.group(match.lastindex or 1), match.start(match.lastindex or 1))
+        )
         at = match.end()
     return tokens
 
@@ -189,7 +201,9 @@ class _Parser:
             # For "90 deg" the message asks for a sign between number and name.
             product = before is not None and before.kind == "number" and kind == "name"
             hint = f"; write {before.text}*{found}" if product and before is not None else ""
-            raise ExpressionError(f"{self.shown}: found {found!r} at position {at + 1}, expected {expected}{hint}")
+            raise ExpressionError(
+                f"{self.shown}: found {found!r} at position {at + 1}, expected {expected}{hint}"
+            )
         raise ExpressionError(f"{self.shown}: ends where {expected} was expected")
 
     def _peek(self) -> str:

@@ -92,9 +92,16 @@ def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
         case Power():
             return replace(tree, base=children[0], exponent=children[1])
         case Product(parts):
-            return Product(tuple((is_factor, child) for (is_factor, _), child in zip(parts, children, strict=True)))
+            return Product(
+                tuple(
+                    (is_factor, child)
+                    for (is_factor, _), child in zip(parts, children, strict=True)
+                )
+            )
         case Sum(parts):
-            return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
+            return Sum(
+                tuple((added, child) for (added, _), child in zip(parts, children, strict=True))
+            )
     return tree
 
 
@@ -157,7 +164,9 @@ def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
     """Return a formula with the parts of the given ids replaced."""
     if id(tree) in places:
         return new
-    return with_operands(tree, [replaced_everywhere(child, places, new) for child in operands(tree)])
+    return with_operands(
+        tree, [replaced_everywhere(child, places, new) for child in operands(tree)]
+    )
 
 
 class _Texts(Algebra[str]):

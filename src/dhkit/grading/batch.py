@@ -70,7 +70,9 @@ def grade_all(
         Fewer than one job, or limits that are not positive.
     """
     if jobs < 1 or seconds <= 0 or memory <= 0:
-        raise ValueError(f"found jobs {jobs}, seconds {seconds}, memory {memory}; expected positive numbers")
+        raise ValueError(
+            f"found jobs {jobs}, seconds {seconds}, memory {memory}; expected positive numbers"
+        )
     limits = WorkerLimits(seconds, memory)
     if hasattr(os, "fork"):
         results = _judge_in_processes(sheets, judge, jobs, limits)
@@ -101,11 +103,17 @@ def _in_order(
 def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: WorkerLimits) -> Iterator[_Numbered]:
     for number, sheet in enumerate(sheets):
         begin = time.monotonic()
-        report = GradeReport(error=sheet.error) if sheet.error else report_of(_judge_to_json(sheet.path, judge, limits))
+        report = (
+            GradeReport(error=sheet.error)
+            if sheet.error
+            else report_of(_judge_to_json(sheet.path, judge, limits))
+        )
         yield number, _with_origin(report, sheet, time.monotonic() - begin)
 
 
-def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: WorkerLimits) -> Iterator[_Numbered]:
+def _judge_in_processes(
+    sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: WorkerLimits
+) -> Iterator[_Numbered]:
     """Yield reports as they are completed; at the end no process is left."""
     waiting = deque(enumerate(sheets))
     with closing(_Pool(judge, limits)) as pool:
@@ -156,7 +164,9 @@ class _Pool:
     def start(self, number: int, sheet: Sheet) -> str:
         """Begin to judge a sheet; return why that is impossible, empty if it is not."""
         try:
-            worker = start_worker(partial(_judge_to_json, sheet.path, self.judge, self.limits), self.limits)
+            worker = start_worker(
+                partial(_judge_to_json, sheet.path, self.judge, self.limits), self.limits
+            )
         except OSError as error:
             return f"no process to judge it in: {error.strerror}"
         self.running[number] = sheet, worker
@@ -169,18 +179,28 @@ class _Pool:
             return []
         now = time.monotonic()
         workers = {number: worker for number, (_, worker) in self.running.items()}
-        for worker in workers.values():  # while the caller was busy, no process could hand in its report
+        for (
+            worker
+        ) in workers.values():  # while the caller was busy, no process could hand in its report
             worker.deadline += max(0.0, now - max(self._waited, worker.begin))
         patience = min(worker.deadline for worker in workers.values()) - now
         done = []
         for key, _ in self._selector.select(max(0.0, patience)):
             is_complete = workers[key.data].read()
             if len(workers[key.data].received) > BOUNDS.report_bytes:
-                done.append(self._finish(key.data, f"the judge wrote more than {BOUNDS.report_bytes / 1e6:g} MB"))
+                done.append(
+                    self._finish(
+                        key.data, f"the judge wrote more than {BOUNDS.report_bytes / 1e6:g} MB"
+                    )
+                )
             elif is_complete:
                 done.append(self._finish(key.data))
         self._waited = time.monotonic()
-        late = [number for number, (_, worker) in self.running.items() if worker.deadline <= self._waited]
+        late = [
+            number
+            for number, (_, worker) in self.running.items()
+            if worker.deadline <= self._waited
+        ]
         return done + [self._finish(number, self.limits.late) for number in late]
 
     def _finish(self, number: int, error: str = "") -> _Numbered:
@@ -203,7 +223,9 @@ class _Pool:
         if is_late(status):
             fault = self.limits.late
         elif status:
-            fault = f"the judge stopped: {_signal_name(-status) if status < 0 else f'status {status}'}"
+            fault = (
+                f"the judge stopped: {_signal_name(-status) if status < 0 else f'status {status}'}"
+            )
         return GradeReport(error=fault)
 
 

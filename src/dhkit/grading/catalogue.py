@@ -36,7 +36,9 @@ def _catalogue(groups: Mapping[tuple[Subject, str], Mapping[str, str]]) -> dict[
     """Return mistakes by identity, of tables that hold, by subject and hint, sentences by identity."""
     mistakes = []
     for (subject, hint), sentences in groups.items():
-        mistakes += [Mistake(identity, subject, sentence, hint) for identity, sentence in sentences.items()]
+        mistakes += [
+            Mistake(identity, subject, sentence, hint) for identity, sentence in sentences.items()
+        ]
     return catalogue(mistakes)
 
 
@@ -62,7 +64,10 @@ _WRITING = _catalogue(
 
 TABLE = _catalogue(
     {
-        (Subject.TABLE, "Look again at the convention: which link do the a and alpha of a row belong to?"): {
+        (
+            Subject.TABLE,
+            "Look again at the convention: which link do the a and alpha of a row belong to?",
+        ): {
             "other_convention": "this is the arm's table in the other convention: rows hold a and alpha of another "
             "link",
         },
@@ -87,7 +92,10 @@ JACOBIAN = _catalogue(
         (Subject.JACOBIAN, "Look again at the derivatives: d/dq cos(q) = -sin(q)."): {
             "derivative_of_cosine": "the derivative of a cosine lacks its minus sign",
         },
-        (Subject.JACOBIAN, "Look again at the order of the columns: which joint does each belong to?"): {
+        (
+            Subject.JACOBIAN,
+            "Look again at the order of the columns: which joint does each belong to?",
+        ): {
             "columns_exchanged": "two columns are exchanged: column i is the velocity per rate of joint i",
         },
     }
@@ -133,11 +141,17 @@ INVERSE = _catalogue(
             "length_taken_as_zero": "the formula is right for an arm in which a length is zero",
             "rounded_length": "a length is rounded: the formula needs all of its digits, or its name",
         },
-        (Subject.INVERSE, "Look again at this step: put the pose of one configuration into both sides, and compare."): {
+        (
+            Subject.INVERSE,
+            "Look again at this step: put the pose of one configuration into both sides, and compare.",
+        ): {
             "equation_wrong": "the equation is not an identity of the arm; no single mistake explains it",
             "solution_wrong": "the solution is wrong given the joints before; no single mistake explains it",
         },
-        (Subject.INVERSE, "Look again at the triangle of the links: what does the law of cosines say?"): {
+        (
+            Subject.INVERSE,
+            "Look again at the triangle of the links: what does the law of cosines say?",
+        ): {
             "cosine_law_factor": "the law of cosines lacks its factor 2: c^2 = a^2 + b^2 - 2 a b cos(C)",
             "cosine_law_sign": "a square in the law of cosines has the wrong sign",
             "cosine_law_squares": "lengths in the law of cosines are not squared",
@@ -152,11 +166,17 @@ INVERSE = _catalogue(
             "root_too_much": "a root is taken where its square belongs",
             "arc_function_forgotten": "the sine, cosine or tangent of the angle is given instead of the angle",
         },
-        (Subject.INVERSE, "Look again at which component of the pose and which length stand where."): {
+        (
+            Subject.INVERSE,
+            "Look again at which component of the pose and which length stand where.",
+        ): {
             "axis_exchanged": "another component of the pose stands where this one belongs",
             "lengths_exchanged": "two lengths are exchanged",
         },
-        (Subject.INVERSE, "Look again at the tool's rotation: rows are the base's axes, columns the tool's."): {
+        (
+            Subject.INVERSE,
+            "Look again at the tool's rotation: rows are the base's axes, columns the tool's.",
+        ): {
             "rotation_matrix_transposed": "the rotation matrix is transposed: r_ij stands where r_ji belongs",
             "tool_axis_exchanged": "another axis of the tool is taken: column j of the rotation is its j-th axis",
             "rotation_not_reduced": "the tool's rotation in the base stands where its rotation in the frame after the "
@@ -167,7 +187,10 @@ INVERSE = _catalogue(
 
 _EQUATION = _catalogue(
     {
-        (Subject.ENERGY, "Look again at the inertia: of which body is this the formula, and about which point?"): {
+        (
+            Subject.ENERGY,
+            "Look again at the inertia: of which body is this the formula, and about which point?",
+        ): {
             "inertia_halved": "the link's inertia about its centre of mass counts by half",
             "disc_for_rod": "the inertia is that of a disc, m r^2/2, instead of a rod's, m l^2/12",
             "point_mass_for_rod": "the inertia is that of a point mass, m l^2, instead of a rod's",
@@ -189,16 +212,25 @@ _EQUATION = _catalogue(
             "payload_not_moved": "the payload is missing in the kinetic energy",
             "payload_at_com": "the payload is placed at the link's centre of mass",
         },
-        (Subject.ENERGY, "Look again at the drives: which rotor and which gear belong to which joint?"): {
+        (
+            Subject.ENERGY,
+            "Look again at the drives: which rotor and which gear belong to which joint?",
+        ): {
             "drives_exchanged": "two drives are exchanged: each rotor has the other's gear and inertia",
             "gear_inverted": "the rotor's inertia is divided by the gear ratio's square instead of multiplied",
         },
-        (Subject.ENERGY, "Look again at the table of the dynamics: convention, twists and lengths."): {
+        (
+            Subject.ENERGY,
+            "Look again at the table of the dynamics: convention, twists and lengths.",
+        ): {
             "convention_in_dynamics": "the table is read in the other convention: a and alpha belong to another link",
             "offset_in_dynamics": "the table's constant offset is missing: the joint's value counts from another zero",
             "twist_sign_in_dynamics": "a twist alpha has the wrong sign in the positions of the links",
         },
-        (Subject.ENERGY, "Look again at the constant angle of the base or of a link, and at its sine and cosine."): {
+        (
+            Subject.ENERGY,
+            "Look again at the constant angle of the base or of a link, and at its sine and cosine.",
+        ): {
             "parameter_sin_cos": "sine and cosine of a constant angle are exchanged",
         },
         (Subject.ENERGY, "Look again at the squares in the kinetic energy."): {
@@ -229,7 +261,10 @@ _EQUATION = _catalogue(
             "motor_torques": "these are the motors' torques; generalised forces of absolute angles are others, S^-T "
             "tau for y = S q",
         },
-        (Subject.EQUATION, "Look again at where each joint's angle is zero, and from which axis it counts."): {
+        (
+            Subject.EQUATION,
+            "Look again at where each joint's angle is zero, and from which axis it counts.",
+        ): {
             "zero_shifted": "the zero pose is a quarter turn off: -sin(q) stands for cos(q), and cos(q) for sin(q)",
             "zero_shifted_back": "the zero pose is a quarter turn off: sin(q) stands for cos(q), and -cos(q) for "
             "sin(q)",
@@ -256,7 +291,10 @@ _EQUATION = _catalogue(
             "friction_gear": "viscous friction lacks a gear ratio: on the joint's side it is the motor's times its "
             "square",
         },
-        (Subject.EQUATION, "Look again at the signs: the Lagrangian is K - V, and torques are d/dt dL/dqd - dL/dq."): {
+        (
+            Subject.EQUATION,
+            "Look again at the signs: the Lagrangian is K - V, and torques are d/dt dL/dqd - dL/dq.",
+        ): {
             "velocity_torques_sign": "the terms with products of rates have the wrong sign",
             "lagrangian_sum": "the energies are added: the Lagrangian is K - V",
             "gravity_torque_sign": "the gravity torques have the wrong sign",
@@ -299,7 +337,9 @@ LIBRARY: Mapping[str, Mistake] = catalogue(
 def capitalize(sentence: str) -> str:
     """Return a sentence with a capital first letter, unless it begins with a symbol: l1, dK/dq, a and d."""
     first, _, rest = sentence.partition(" ")
-    is_word = first.rstrip(":").isalpha() and (len(first) > 2 or (first == "a" and not rest.startswith("and d ")))
+    is_word = first.rstrip(":").isalpha() and (
+        len(first) > 2 or (first == "a" and not rest.startswith("and d "))
+    )
     return sentence[0].upper() + sentence[1:] if is_word else sentence
 
 

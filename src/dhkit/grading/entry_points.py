@@ -72,12 +72,16 @@ def grade(
     given = None if robot is None else description_of(robot)
     suffix = path.suffix.lower()
     if suffix not in SHEET_SUFFIXES:
-        raise AnswerError(f"{path}: not read: {path.suffix or path.name}; expected {', '.join(SHEET_SUFFIXES)}")
+        raise AnswerError(
+            f"{path}: not read: {path.suffix or path.name}; expected {', '.join(SHEET_SUFFIXES)}"
+        )
     if suffix == ".toml":
         sheet = read_sheet(path)
     else:
         if given is None:
-            raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
+            raise AnswerError(
+                f"{path}: a program does not say which robot it is about; give one (--robot)"
+            )
         task = chosen.task
         names = NO_NAMES if task is None else task.names
         if chosen.execute and suffix != ".tex":
@@ -92,7 +96,9 @@ def grade(
     return replace(_judged(sheet, description, digits, chosen), own_robot=given is None)
 
 
-def _judged(sheet: AnswerSheet, description: Description, digits: int, options: GradeOptions) -> GradeReport:
+def _judged(
+    sheet: AnswerSheet, description: Description, digits: int, options: GradeOptions
+) -> GradeReport:
     if (task := options.task) is not None:
         sheet = replace(sheet, task=task.task, names=_merge_names(sheet.names, task.names))
     return judge_sheet(description, sheet, digits, seed=options.seed, explain=options.explain)
@@ -101,7 +107,9 @@ def _judged(sheet: AnswerSheet, description: Description, digits: int, options: 
 def _require_permission(path: Path, task: AnswerSheet | None) -> None:
     """Refuse to execute a program for a task that does not permit it."""
     if task is not None and not task.task.may_execute:
-        raise AnswerError(f"{path}: the task does not permit executing programs (execute = true in [task])")
+        raise AnswerError(
+            f"{path}: the task does not permit executing programs (execute = true in [task])"
+        )
 
 
 def _merge_names(own: Names, given: Names) -> Names:
@@ -155,8 +163,12 @@ def grade_answers(
             entries[name] = value if name in ("dh", "ik") else entries_of(value, description.n)
         except AnswerError as error:
             raise AnswerError(f"{name}: {error}") from None
-    sheet = sheet_of({"answer": entries, "names": dict(names or {}), "task": dict(task or {})}, "answers")
-    report = judge_sheet(description, sheet, (rubric or Rubric()).digits, seed=seed, explain=explain)
+    sheet = sheet_of(
+        {"answer": entries, "names": dict(names or {}), "task": dict(task or {})}, "answers"
+    )
+    report = judge_sheet(
+        description, sheet, (rubric or Rubric()).digits, seed=seed, explain=explain
+    )
     return replace(report, sheet=None)
 
 
@@ -173,7 +185,9 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     name = sheet.robot
     place = f"{sheet.file}: robot"
     if not name:
-        raise AnswerError(f"{place}: missing; expected a library name, or a robot file beside the sheet")
+        raise AnswerError(
+            f"{place}: missing; expected a library name, or a robot file beside the sheet"
+        )
     if not name.endswith(".toml"):
         try:
             return library_robot(name)
@@ -184,7 +198,11 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     inside = Path(folder).resolve()
     try:
         path = (inside / name).resolve()
-    except (ValueError, OSError, RuntimeError):  # a NUL in the name, a name that is too long, a link to itself
+    except (
+        ValueError,
+        OSError,
+        RuntimeError,
+    ):  # a NUL in the name, a name that is too long, a link to itself
         raise AnswerError(f"{place}: {name[:60]!r} is not a file name") from None
     if not path.is_relative_to(inside):
         raise AnswerError(f"{place}: {name!r} leaves the sheet's folder; expected a file in it")
@@ -204,7 +222,9 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         derived.
     """
     if report is None:
-        judge_sheet(description or library_robot("planar2r"), sheet_of({"answer": {"A1": _IDENTITY}}))
+        judge_sheet(
+            description or library_robot("planar2r"), sheet_of({"answer": {"A1": _IDENTITY}})
+        )
         import mpmath  # noqa: F401
         import scipy.optimize  # noqa: F401
 

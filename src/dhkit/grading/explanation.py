@@ -89,7 +89,10 @@ def explanation_html(description: Description) -> str:
         return inverse.html()
     body = [f"<h1>{html.escape(description.name)}: the equations of motion, step by step</h1>"]
     for number, step in enumerate(_worked_solution(description), start=1):
-        body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.method)}</p>"]
+        body += [
+            f"<h2>{number}. {html.escape(step.title)}</h2>",
+            f"<p>{html.escape(step.method)}</p>",
+        ]
         for result in step.results:
             formula = mathml(f"{result.latex_name} = {latex_text(result.element)}")
             text = f"{result.name} = {plain_text(result.element)}"
@@ -145,7 +148,9 @@ class _Solution:
             self._energies_method(),
             [("K", element_array(self.textbook.K)), ("V", element_array(self.textbook.V))],
         )
-        yield self._step("Mass matrix", "M_ij is the second derivative of K by qd_i and qd_j.", [("M", lag.M)])
+        yield self._step(
+            "Mass matrix", "M_ij is the second derivative of K by qd_i and qd_j.", [("M", lag.M)]
+        )
         yield self._step(
             "Coriolis matrix",
             "Christoffel symbols c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i)/2, and C_ij = sum of c_ijk qd_k.",
@@ -179,7 +184,9 @@ class _Solution:
             [(f"K{number}", element_array(body.K)), (f"V{number}", element_array(body.V))],
         )
 
-    def _step(self, title: str, method: str, quantities: Sequence[tuple[str, Elements]]) -> SolutionStep:
+    def _step(
+        self, title: str, method: str, quantities: Sequence[tuple[str, Elements]]
+    ) -> SolutionStep:
         results = []
         for name, array in quantities:
             stem = name.rstrip("0123456789")

@@ -63,9 +63,13 @@ class Witness:
     truth: float | None
 
     def __repr__(self) -> str:
-        answer, truth = ("no value" if value is None else f"{value:.6g}" for value in (self.answer, self.truth))
+        answer, truth = (
+            "no value" if value is None else f"{value:.6g}" for value in (self.answer, self.truth)
+        )
         state = ", ".join(f"{name} = {value:.4g}" for name, value in self.state.items())
-        return repr_line("Witness", summary=f"answer {answer}, truth {truth}{f' at {state}' if state else ''}")
+        return repr_line(
+            "Witness", summary=f"answer {answer}, truth {truth}{f' at {state}' if state else ''}"
+        )
 
 
 @dataclass(frozen=True)
@@ -126,11 +130,14 @@ class Entry:
             "why": self.statement,
             "answer less the truth": self.difference or "",
             "follows from": self.follows,
-            "witness": "" if self.witness is None else repr(self.witness)[1:-1].removeprefix("Witness: "),
+            "witness": ""
+            if self.witness is None
+            else repr(self.witness)[1:-1].removeprefix("Witness: "),
         }
         rows = [(name, text) for name, text in texts.items() if text]
         return html_block(
-            f"{self.name}: {self.verdict.value}", html_table((), rows, longest=BOUNDS.notebook_characters)
+            f"{self.name}: {self.verdict.value}",
+            html_table((), rows, longest=BOUNDS.notebook_characters),
         )
 
 
@@ -143,7 +150,9 @@ def entry_name(quantity: str, index: tuple[int, ...]) -> str:
 
 def worst_verdict(entries: Iterable[Entry]) -> Verdict | None:
     """Return the worst verdict on some entries; None without entries."""
-    return max((entry.verdict for entry in entries), key=lambda verdict: verdict.severity, default=None)
+    return max(
+        (entry.verdict for entry in entries), key=lambda verdict: verdict.severity, default=None
+    )
 
 
 @dataclass(frozen=True)
@@ -333,7 +342,9 @@ class GradeReport:
         if self.error:
             return f"{self.robot or self.sheet}: unreadable: {self.error}"
         failed = [
-            entry.name for entry in self.entries if not entry.verdict.passes and entry.verdict is not Verdict.INCOMPLETE
+            entry.name
+            for entry in self.entries
+            if not entry.verdict.passes and entry.verdict is not Verdict.INCOMPLETE
         ]
         head = f"{self.robot}: {self.conclusion}" + (f": {', '.join(failed)}" if failed else "")
         return "\n".join([head, *(f"  {line}" for line in self._diagnosis_lines)])
@@ -396,7 +407,9 @@ class GradeReport:
         title = " by ".join(filter(None, (self.robot or self.sheet, self.student)))
         # The worst first, because the table of a notebook is cut.
         entries = sorted(self.entries, key=lambda entry: -entry.verdict.severity)
-        rows = [(entry.name, entry.verdict.value, entry.answer, entry.statement) for entry in entries]
+        rows = [
+            (entry.name, entry.verdict.value, entry.answer, entry.statement) for entry in entries
+        ]
         table = html_table(("entry", "verdict", "answer", "why"), rows) if rows else ""
         return html_block(f"{title}: {self._summary}", table, html_lines(self._diagnosis_lines))
 

@@ -153,7 +153,9 @@ def result_of(work: Callable[[], bytes], limits: WorkerLimits) -> bytes:
     try:
         is_complete = False
         while not is_complete:
-            if not select.select([worker.pipe], [], [], max(0.0, worker.deadline - time.monotonic()))[0]:
+            if not select.select(
+                [worker.pipe], [], [], max(0.0, worker.deadline - time.monotonic())
+            )[0]:
                 raise TimeoutError(limits.late)
             is_complete = worker.read()
     finally:
@@ -178,7 +180,9 @@ def _run(end: int, work: Callable[[], bytes], limits: WorkerLimits) -> NoReturn:
     try:
         with contextlib.suppress(OSError):
             os.setpgid(0, 0)
-        end = fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 3)  # a parent without an input gives the pipe the number 0
+        end = fcntl.fcntl(
+            end, fcntl.F_DUPFD_CLOEXEC, 3
+        )  # a parent without an input gives the pipe the number 0
         _close_files(end)
         _set_limits(limits)
         text = memoryview(work())

@@ -54,8 +54,13 @@ class Marks:
         return repr_line("Marks", summary=self._points)
 
     def _repr_html_(self) -> str:
-        rows = [(mark.name, f"{mark.points:.4g}", f"{mark.most:.4g}", mark.rule) for mark in self.quantities]
-        return html_block(self._points, html_table(("quantity", "points", "of", "rule"), rows, align="lrrl"))
+        rows = [
+            (mark.name, f"{mark.points:.4g}", f"{mark.most:.4g}", mark.rule)
+            for mark in self.quantities
+        ]
+        return html_block(
+            self._points, html_table(("quantity", "points", "of", "rule"), rows, align="lrrl")
+        )
 
     @property
     def _points(self) -> str:
@@ -73,29 +78,42 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     total = sum(weights.values()) or Fraction(1)
     points = _exact(rubric.points)
     entries = []
-    sums = {quantity: [Fraction(0), points * weight / total] for quantity, weight in weights.items()}
+    sums = {
+        quantity: [Fraction(0), points * weight / total] for quantity, weight in weights.items()
+    }
     for entry in report.entries:
         most = sums[entry.quantity][1] * _part(entry, report, rubric)
         share, rule = _share(entry, report, rubric.credit)
         sums[entry.quantity][0] += share * most
-        entries.append(Mark(entry.name, float(share * most), float(most), rule if most else "counts nothing"))
+        entries.append(
+            Mark(entry.name, float(share * most), float(most), rule if most else "counts nothing")
+        )
     missing = weights.keys() - set(report.quantities)
     quantities = []
     for quantity, (got, most) in sums.items():
         rule = "not on the sheet" if quantity in missing else ""
         quantities.append(Mark(quantity, float(got), float(most), rule))
-    return Marks(float(sum(got for got, _ in sums.values())), rubric.points, tuple(entries), tuple(quantities))
+    return Marks(
+        float(sum(got for got, _ in sums.values())),
+        rubric.points,
+        tuple(entries),
+        tuple(quantities),
+    )
 
 
 def _quantity_weights(report: GradeReport, rubric: Rubric) -> dict[str, Fraction]:
     """Return the weights of the quantities on the sheet, and of those that should be on it."""
-    named = {name: _exact(weight) for name, weight in rubric.weights.items() if QUANTITY.fullmatch(name)}
+    named = {
+        name: _exact(weight) for name, weight in rubric.weights.items() if QUANTITY.fullmatch(name)
+    }
     others = Fraction(0 if any(named.values()) else 1)
     weights = {quantity: named.get(quantity, others) for quantity in report.quantities}
     for quantity in weights:
         if not any(_entry_weight(entry, rubric) for entry in report.of(quantity)):
             weights[quantity] = Fraction(0)
-    return weights | {quantity: weight for quantity, weight in named.items() if weight and quantity not in weights}
+    return weights | {
+        quantity: weight for quantity, weight in named.items() if weight and quantity not in weights
+    }
 
 
 def _entry_weight(entry: Entry, rubric: Rubric) -> Fraction:
@@ -126,7 +144,9 @@ def _share(entry: Entry, report: GradeReport, credit: Credit) -> tuple[Fraction,
     return share, rule if share in (0, 1) else f"{rule}: {100 * float(share):g} %"
 
 
-def _reasons(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> list[tuple[Fraction, str]]:
+def _reasons(
+    entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit
+) -> list[tuple[Fraction, str]]:
     """Return the shares that a wrong entry may get, with their rules."""
     mistakes = [one for one in diagnosis if one.mistake and entry.name in one.entries]
     reasons = [(_exact(credit.follow_on), f"follows from {entry.follows}")] if entry.follows else []
@@ -142,8 +162,12 @@ def _reasons(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> 
 def _mistake_share(diagnosis: Diagnosis, credit: Credit, otherwise: float) -> float:
     """Return the rubric's share for a mistake, or for an equivalent one that gets more."""
     names = (str(diagnosis.mistake), *diagnosis.equivalent)
-    bare = [name if name in credit.mistakes else name.partition(" (")[0] for name in names]  # half_forgotten (link 2)
-    return max((credit.mistakes[name] for name in bare if name in credit.mistakes), default=otherwise)
+    bare = [
+        name if name in credit.mistakes else name.partition(" (")[0] for name in names
+    ]  # half_forgotten (link 2)
+    return max(
+        (credit.mistakes[name] for name in bare if name in credit.mistakes), default=otherwise
+    )
 
 
 def _exact(number: float) -> Fraction:

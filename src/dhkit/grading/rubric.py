@@ -116,7 +116,9 @@ class Rubric:
             rubric = TypeAdapter(cls).validate_python(dict(data))
         except ValidationError as error:
             # A mistyped key is the most useful message.
-            errors = sorted(error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument")
+            errors = sorted(
+                error.errors(), key=lambda one: one["type"] != "unexpected_keyword_argument"
+            )
             raise AnswerError(place + _one_line(errors[0])) from None
         weights: dict[str, float] = {}
         for name, weight in rubric.weights.items():
@@ -139,11 +141,17 @@ class Rubric:
         """
         for name in self.credit.mistakes:
             if name not in known:
-                raise AnswerError(f"{place}credit.mistakes: no mistake {name[:80]!r}{_hint(name, sorted(known))}")
+                raise AnswerError(
+                    f"{place}credit.mistakes: no mistake {name[:80]!r}{_hint(name, sorted(known))}"
+                )
 
     def __repr__(self) -> str:
-        weights = ", ".join(f"{name} {weight:g}" for name, weight in self.weights.items()) or "all alike"
-        return repr_line("Rubric", summary=f"{self.points:g} points, feedback {self.feedback}, weights {weights}")
+        weights = (
+            ", ".join(f"{name} {weight:g}" for name, weight in self.weights.items()) or "all alike"
+        )
+        return repr_line(
+            "Rubric", summary=f"{self.points:g} points, feedback {self.feedback}, weights {weights}"
+        )
 
 
 def _entry_name(name: str) -> str | None:
@@ -169,7 +177,9 @@ def _one_line(error: ErrorDetails) -> str:
 
 
 def _hint(name: str, known: Collection[str]) -> str:
-    close = difflib.get_close_matches(name[:80], known, n=1) or [one for one in known if one.lower() == name.lower()]
+    close = difflib.get_close_matches(name[:80], known, n=1) or [
+        one for one in known if one.lower() == name.lower()
+    ]
     return f"; did you mean {close[0]!r}?" if close else f"; expected one of {', '.join(known)}"
 
 

@@ -72,7 +72,9 @@ def _document(noun: str, kind: str, description: str, **definitions: Schema) -> 
     """Return the schema of a document that may contain a rubric, with further definitions."""
     rubric = rubric_schema()
     definitions |= rubric.pop("$defs")
-    definitions["Rubric"] = {key: value for key, value in rubric.items() if key not in ("$schema", "title")}
+    definitions["Rubric"] = {
+        key: value for key, value in rubric.items() if key not in ("$schema", "title")
+    }
     table = _table(KEYS[kind], _properties(), description)
     return titled_schema(f"dhkit {noun}, format {FORMAT}", table | {"$defs": definitions})
 
@@ -82,20 +84,27 @@ def _properties() -> Schema:
     names = {"type": "array", "items": {"type": "string"}}
     keys = {
         "format": {"const": FORMAT, "description": "Version of the file's format."},
-        "robot": _text("Robot: a library name (see `dhkit robots`), or a robot file (.toml) in this file's folder."),
+        "robot": _text(
+            "Robot: a library name (see `dhkit robots`), or a robot file (.toml) in this file's folder."
+        ),
         "student": _text("Student's name."),
         "rubric": {
             "$ref": "#/$defs/Rubric",
             "description": "Weights of the answers, unless --rubric says it; a sheet's own counts where it is alone.",
         },
-        "q": names | {"description": "Names of the joint variables (rad, m), one a joint; q1 ... qn unless given."},
+        "q": names
+        | {
+            "description": "Names of the joint variables (rad, m), one a joint; q1 ... qn unless given."
+        },
         "qd": names | {"description": "Names of their rates (rad/s, m/s)."},
         "state": {
             "type": "string",
             "description": "Order of a state vector x of an executed program, such as 'q, qd'.",
         },
         "qdd": names | {"description": "Names of their accelerations (rad/s^2, m/s^2)."},
-        "angles": _choice("angles", "Whether angles count from the link before, or from a fixed direction."),
+        "angles": _choice(
+            "angles", "Whether angles count from the link before, or from a fixed direction."
+        ),
         "parameters": {
             "type": "object",
             "description": "Further names, each an expression in the robot's parameters and in names before it.",
@@ -103,18 +112,30 @@ def _properties() -> Schema:
             "maxProperties": BOUNDS.names,
         },
         "friction": _switch("Whether tau includes viscous friction."),
-        "execute": _switch("Whether programs may be executed where `dhkit grade --execute` asks for it."),
+        "execute": _switch(
+            "Whether programs may be executed where `dhkit grade --execute` asks for it."
+        ),
         "packages": names
-        | {"description": "Packages that executed programs may import; numpy, scipy, sympy and casadi unless given."},
-        "total_derivative": _switch("Whether L is right up to the time derivative of a function of q."),
+        | {
+            "description": "Packages that executed programs may import; numpy, scipy, sympy and casadi unless given."
+        },
+        "total_derivative": _switch(
+            "Whether L is right up to the time derivative of a function of q."
+        ),
         "asked": {
             "type": "array",
             "description": "Quantities that were assigned: a sheet without one of them is incomplete.",
             "items": {"type": "string", "pattern": _whole(QUANTITY.pattern)},
         },
-        "proof": _choice("proof", "Whether an answer has to be proved equal, or may be tried at random states."),
-        "frames": _choice("frames", "Whether a table may place its frames freely, or must have the robot file's."),
-        "zero": _choice("zero", "Whether a table's zero pose is free, or must be the robot file's."),
+        "proof": _choice(
+            "proof", "Whether an answer has to be proved equal, or may be tried at random states."
+        ),
+        "frames": _choice(
+            "frames", "Whether a table may place its frames freely, or must have the robot file's."
+        ),
+        "zero": _choice(
+            "zero", "Whether a table's zero pose is free, or must be the robot file's."
+        ),
         "values": _switch(
             "Whether answers in numbers pass that are right at the robot file's values; true if not given."
         ),
@@ -126,7 +147,8 @@ def _properties() -> Schema:
             "uniqueItems": True,
         },
         "convention": _choice(
-            "convention", "Whose Denavit-Hartenberg table it is: the standard one, or Craig's modified."
+            "convention",
+            "Whose Denavit-Hartenberg table it is: the standard one, or Craig's modified.",
         ),
         "rows": {
             "type": "array",
@@ -134,7 +156,9 @@ def _properties() -> Schema:
             "minItems": 1,
             "items": {
                 "type": "array",
-                "prefixItems": [_ENTRY | {"description": f"{name}, {_UNITS[name]}"} for name in COLUMNS],
+                "prefixItems": [
+                    _ENTRY | {"description": f"{name}, {_UNITS[name]}"} for name in COLUMNS
+                ],
                 "minItems": len(COLUMNS),
                 "maxItems": len(COLUMNS),
             },
@@ -148,9 +172,17 @@ def _properties() -> Schema:
         },
     }
     keys |= {
-        "joint": {"type": "integer", "minimum": 1, "description": "The joint that a step finds, from 1."},
-        "equation": _formulas("Equation that determines the joint from those before, with one equals sign."),
-        "solution": _formulas("The joint's value (rad, m), in joints of earlier steps; ± or a list for both roots."),
+        "joint": {
+            "type": "integer",
+            "minimum": 1,
+            "description": "The joint that a step finds, from 1.",
+        },
+        "equation": _formulas(
+            "Equation that determines the joint from those before, with one equals sign."
+        ),
+        "solution": _formulas(
+            "The joint's value (rad, m), in joints of earlier steps; ± or a list for both roots."
+        ),
     }
     keys["steps"] = {
         "type": "array",
@@ -158,13 +190,17 @@ def _properties() -> Schema:
         "minItems": 1,
         "maxItems": BOUNDS.steps,
         "items": _table(KEYS["step"], keys, "An equation, its solution, or both.")
-        | {"required": ["joint"], "anyOf": [{"required": ["equation"]}, {"required": ["solution"]}]},
+        | {
+            "required": ["joint"],
+            "anyOf": [{"required": ["equation"]}, {"required": ["solution"]}],
+        },
     }
     tables = {
         "names": _table(KEYS["names"], keys, "The student's own names."),
         "task": _table(KEYS["task"], keys, "What was asked for, where there is a choice."),
         "answer": _answer(
-            dh=_table(KEYS["dh"], keys, "A table: theta, d, a, alpha by row.") | {"required": ["rows"]},
+            dh=_table(KEYS["dh"], keys, "A table: theta, d, a, alpha by row.")
+            | {"required": ["rows"]},
             ik=_table(KEYS["ik"], keys, "Inverse kinematics: formulas of branches, or steps.")
             | {"oneOf": [{"required": ["branches"]}, {"required": ["steps"]}]},
         ),
@@ -174,7 +210,12 @@ def _properties() -> Schema:
 
 def _table(keys: Sequence[str], properties: Schema, description: str) -> Schema:
     known = {key: properties[key] for key in keys}
-    return {"type": "object", "description": description, "properties": known, "additionalProperties": False}
+    return {
+        "type": "object",
+        "description": description,
+        "properties": known,
+        "additionalProperties": False,
+    }
 
 
 def _answer(**tables: Schema) -> Schema:
@@ -188,8 +229,10 @@ def _answer(**tables: Schema) -> Schema:
         "description": "Formulas in quotes or numbers, alone or in lists; what is empty is not handed in.",
         "properties": whole | tables,
         "patternProperties": {
-            _whole("A[1-9][0-9]?"): _ANSWER | {"description": "Link transform from link i - 1 to link i, 4 rows of 4."},
-            _whole(element): _ENTRY | {"description": "A single entry, counted from 1: M11, g_2, A1_14."},
+            _whole("A[1-9][0-9]?"): _ANSWER
+            | {"description": "Link transform from link i - 1 to link i, 4 rows of 4."},
+            _whole(element): _ENTRY
+            | {"description": "A single entry, counted from 1: M11, g_2, A1_14."},
         },
         "additionalProperties": False,
         "minProperties": 1,
@@ -198,7 +241,10 @@ def _answer(**tables: Schema) -> Schema:
 
 def _formulas(description: str) -> Schema:
     """Return the schema of a formula, or of a list of them."""
-    return {"anyOf": [_ENTRY, {"type": "array", "items": _ENTRY, "maxItems": BOUNDS.steps}], "description": description}
+    return {
+        "anyOf": [_ENTRY, {"type": "array", "items": _ENTRY, "maxItems": BOUNDS.steps}],
+        "description": description,
+    }
 
 
 def _text(description: str) -> Schema:

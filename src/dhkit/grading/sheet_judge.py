@@ -52,7 +52,12 @@ from dhkit.symbolic.ring import RingError
 
 
 def judge_sheet(
-    description: Description, sheet: AnswerSheet, digits: int = 4, *, seed: int | None = None, explain: bool = True
+    description: Description,
+    sheet: AnswerSheet,
+    digits: int = 4,
+    *,
+    seed: int | None = None,
+    explain: bool = True,
 ) -> GradeReport:
     """Judge everything on a sheet.
 
@@ -88,7 +93,9 @@ def judge_sheet(
     if not judged and not others:
         raise next(
             iter(refused.values()),
-            AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity"),
+            AnswerError(
+                f"{sheet.file}: answer: every entry is empty; expected at least one quantity"
+            ),
         )
     explanation = _explain(truth, judged, digits) if explain else _Explanation()
     diagnosis = [*explanation.diagnosis]
@@ -99,7 +106,9 @@ def judge_sheet(
         at_values |= _numbers_in(truth, quantity)
     notes = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
     notes += [*_notes(truth, judged, vocabulary), *explanation.notes]
-    entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
+    entries += [
+        Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()
+    ]
     for other in others:
         at_values |= other.at_values
         entries += other.entries
@@ -166,7 +175,9 @@ class _SheetJudge:
                     read[name] = self._jacobian(value, names, matrix_of)
                 else:
                     shape = shape_of(name, names.n)
-                    read[name] = given_quantity(name, value, shape, self.vocabulary, names, matrix_of.without(name))
+                    read[name] = given_quantity(
+                        name, value, shape, self.vocabulary, names, matrix_of.without(name)
+                    )
             except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
         read_entries = chain.from_iterable(read.values())
@@ -176,7 +187,13 @@ class _SheetJudge:
         for name, given in read.items():
             try:
                 judged[name] = judge_quantity(
-                    name, given, self.truth, self.sheet.task, self.digits, self.seed, letters=letters
+                    name,
+                    given,
+                    self.truth,
+                    self.sheet.task,
+                    self.digits,
+                    self.seed,
+                    letters=letters,
                 )
             except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
@@ -188,7 +205,9 @@ class _SheetJudge:
             return error
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
-    def _jacobian(self, value: object, names: QuantityNames, matrix_of: SheetMatrices) -> tuple[Given, ...]:
+    def _jacobian(
+        self, value: object, names: QuantityNames, matrix_of: SheetMatrices
+    ) -> tuple[Given, ...]:
         """Return the entries of a Jacobian: of the task's rows, of six, or of those that an arm's motion has.
 
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
@@ -199,11 +218,15 @@ class _SheetJudge:
         for rows in [asked] if asked else [(0, 1, 2, 3, 4, 5), *self._rows_of_few()]:
             size = (len(rows), names.n)
             try:
-                given = given_quantity("J", value, size, self.vocabulary, names, matrix_of.without("J"))
+                given = given_quantity(
+                    "J", value, size, self.vocabulary, names, matrix_of.without("J")
+                )
             except AnswerError as error:
                 errors.append(error)
                 continue
-            return tuple(replace(entry, index=(rows[entry.index[0]], entry.index[1])) for entry in given)
+            return tuple(
+                replace(entry, index=(rows[entry.index[0]], entry.index[1])) for entry in given
+            )
         raise errors[0]
 
     def _rows_of_few(self) -> list[tuple[int, ...]]:
@@ -232,7 +255,10 @@ class _SheetJudge:
         """Judge the table and the inverse kinematics; return them, and the errors of those that were refused."""
         judged: list[KinematicJudgement] = []
         refused: dict[str, DhkitError] = {}
-        for name, is_given in (("dh", self.sheet.table), ("ik", self.sheet.branches or self.sheet.steps)):
+        for name, is_given in (
+            ("dh", self.sheet.table),
+            ("ik", self.sheet.branches or self.sheet.steps),
+        ):
             if is_given:
                 try:
                     judged.append(self._table() if name == "dh" else self._inverse(explain))
@@ -272,23 +298,31 @@ class _SheetJudge:
             for step in steps:
                 step_trees += [*step.solutions, *chain.from_iterable(step.equations)]
 
-            def judge_changed_steps(arm: Description, formula: _Change, explain: bool) -> KinematicJudgement:
+            def judge_changed_steps(
+                arm: Description, formula: _Change, explain: bool
+            ) -> KinematicJudgement:
                 changed = [step.changed(formula) for step in steps]
                 return judge_steps(arm, changed, seed=self.seed, explain=explain)
 
             return self._at_other_values(step_trees, judge_changed_steps, explain)
 
         def judge_branches(branches: Sequence[Sequence[Tree]]) -> KinematicJudgement:
-            def judge_changed_branches(arm: Description, formula: _Change, explain: bool) -> KinematicJudgement:
+            def judge_changed_branches(
+                arm: Description, formula: _Change, explain: bool
+            ) -> KinematicJudgement:
                 changed = [list(map(formula, branch)) for branch in branches]
                 return judge_inverse(arm, changed, seed=self.seed, explain=explain)
 
-            return self._at_other_values(list(chain.from_iterable(branches)), judge_changed_branches, explain)
+            return self._at_other_values(
+                list(chain.from_iterable(branches)), judge_changed_branches, explain
+            )
 
         given = given_branches(self.sheet.branches, description.n, vocabulary)
         return _judge_rows("ik", given, judge_branches)
 
-    def _at_other_values(self, trees: Sequence[Tree], judge: _FormulaJudge, explain: bool) -> KinematicJudgement:
+    def _at_other_values(
+        self, trees: Sequence[Tree], judge: _FormulaJudge, explain: bool
+    ) -> KinematicJudgement:
         """Judge formulas at the file's values; those that pass at other values of the arm's letters too.
 
         Where letters have equal values, mistakes are looked for at other values: one would look like another.
@@ -302,12 +336,18 @@ class _SheetJudge:
         passing = {entry.index for entry in judged.entries if entry.verdict.passes}
         if other.description is not None and (passing or is_ambiguous):
             elsewhere = judge(other.description, other.formula, explain)
-            failing = {entry.index: entry for entry in elsewhere.entries if not entry.verdict.passes}
+            failing = {
+                entry.index: entry for entry in elsewhere.entries if not entry.verdict.passes
+            }
             if by_chance := passing & failing.keys():
                 values = tuple(f"{name} = {value:.6g}" for name, value in other.changed.items())
-                entries = tuple(failing[e.index] if e.index in by_chance else e for e in judged.entries)
+                entries = tuple(
+                    failing[e.index] if e.index in by_chance else e for e in judged.entries
+                )
                 notes = (*elsewhere.notes, Note(NoteKind.ONLY_AT_VALUES, "ik", values))
-                judged = replace(judged, entries=entries, notes=notes, diagnosis=elsewhere.diagnosis)
+                judged = replace(
+                    judged, entries=entries, notes=notes, diagnosis=elsewhere.diagnosis
+                )
             elif is_ambiguous:
                 judged = replace(judged, diagnosis=elsewhere.diagnosis)
         elif is_ambiguous:
@@ -325,7 +365,9 @@ def _unchanged(tree: Tree) -> Tree:
     return tree
 
 
-def _in_numbers(judged: KinematicJudgement, at_values: Mapping[str, float], task: Requirements) -> KinematicJudgement:
+def _in_numbers(
+    judged: KinematicJudgement, at_values: Mapping[str, float], task: Requirements
+) -> KinematicJudgement:
     """Return a judgement of an answer that has letters as numbers: it is incomplete where the task asks for letters."""
     if not at_values:
         return judged
@@ -343,7 +385,9 @@ def _incomplete_if_passing(entry: Entry, statement: str) -> Entry:
 
 
 def _judge_rows(
-    name: str, rows: Sequence[Sequence[Given]], judge: Callable[[Sequence[Sequence[Tree]]], KinematicJudgement]
+    name: str,
+    rows: Sequence[Sequence[Given]],
+    judge: Callable[[Sequence[Sequence[Tree]]], KinematicJudgement],
 ) -> KinematicJudgement:
     """Judge rows of a table, or branches of inverse kinematics; all are unreadable if an entry cannot be read."""
     texts = []
@@ -386,7 +430,9 @@ def _explain(truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int) ->
     consistency = Consistency(truth, judged)
     try:
         follows = {name: consistency.follows(name) for name in judged}
-        return _Explanation(follows, consistency.notes(), explain_mistakes(truth, judged, digits, follows))
+        return _Explanation(
+            follows, consistency.notes(), explain_mistakes(truth, judged, digits, follows)
+        )
     except RingError as error:
         note = Note(NoteKind.NOT_EXPLAINED, values=(str(error)[:160],))
         return _Explanation(notes=[note])
@@ -399,7 +445,9 @@ def _is_empty(value: object) -> bool:
     return isinstance(value, str) and not value.strip()
 
 
-def _entries(truth: Truth, quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]) -> Iterator[Entry]:
+def _entries(
+    truth: Truth, quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]
+) -> Iterator[Entry]:
     for given in quantity.given:
         finding = shown_in_own_angles(truth, quantity.name, quantity.findings[given.index])
         text, latex = typeset(given.tree) if given.tree is not None else ("", "")
@@ -423,20 +471,32 @@ def _numbers_in(truth: Truth, quantity: JudgedQuantity) -> dict[str, float]:
     return {parameter: values[parameter] for parameter in sorted(quantity.numbers)}
 
 
-def _notes(truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocabulary) -> list[Note]:
+def _notes(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], vocabulary: Vocabulary
+) -> list[Note]:
     """Return the notes on quantities of equations and transforms."""
     notes = []
     for name, quantity in judged.items():
         if quantity.numbers:
             numbers = tuple(f"{p} = {value:g}" for p, value in _numbers_in(truth, quantity).items())
             notes.append(Note(NoteKind.NUMBERS, name, numbers))
-        notes += [Note(NoteKind.SIDES_DIFFER, entry_name(name, index)) for index in quantity.contradictions]
+        notes += [
+            Note(NoteKind.SIDES_DIFFER, entry_name(name, index))
+            for index in quantity.contradictions
+        ]
         unread = (entry.index for entry in quantity.given if entry.is_partly_read)
         notes += [Note(NoteKind.SIDES_UNREAD, entry_name(name, index)) for index in unread]
     if "C" in judged and (kind := _factorization(truth, judged["C"])):
         notes.append(Note(kind, "C"))
-    notes += [Note(NoteKind.TAKEN_FOR, values=(typed, meant)) for typed, meant in vocabulary.taken_for.items()]
-    notes += [Note(NoteKind.UP_TO_A_CONSTANT, name) for name in ("V", "L") if _is_shifted(judged.get(name))]
+    notes += [
+        Note(NoteKind.TAKEN_FOR, values=(typed, meant))
+        for typed, meant in vocabulary.taken_for.items()
+    ]
+    notes += [
+        Note(NoteKind.UP_TO_A_CONSTANT, name)
+        for name in ("V", "L")
+        if _is_shifted(judged.get(name))
+    ]
     return notes
 
 

@@ -76,7 +76,9 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
             raise AnswerError(
                 f"{path}: no such file; expected an answer sheet or a folder of them (--template NAME makes one)"
             )
-        for sheet in _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]:
+        for sheet in (
+            _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]
+        ):
             found.setdefault(sheet.path.absolute(), sheet)
             if len(found) > BOUNDS.sheets:
                 raise AnswerError(f"{path}: more than {BOUNDS.sheets} answer sheets")
@@ -100,11 +102,16 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
         else:
             sheets.setdefault(sheet.student, []).append(sheet)
     if not sheets:
-        raise AnswerError(f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SHEET_SUFFIXES))}")
+        raise AnswerError(
+            f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SHEET_SUFFIXES))}"
+        )
     for student, paths in unread.items():
         if student in sheets:
             first, *others = sheets[student]
-            sheets[student] = [replace(first, beside=_shorten([path.name for path in paths])), *others]
+            sheets[student] = [
+                replace(first, beside=_shorten([path.name for path in paths])),
+                *others,
+            ]
         else:
             kinds = dict.fromkeys(path.suffix.lower() or path.name for path in paths)
             error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(SHEET_SUFFIXES))}"
@@ -125,7 +132,9 @@ def _visit(root: Path) -> Iterator[Sheet]:
     inside = root.resolve()
     for looked_at, path in enumerate(_walk(root, 0)):
         if looked_at >= BOUNDS.files:
-            raise AnswerError(f"{root}: more than {BOUNDS.files} files; expected a folder of answer sheets")
+            raise AnswerError(
+                f"{root}: more than {BOUNDS.files} files; expected a folder of answer sheets"
+            )
         parts = path.relative_to(root).parts
         student = path.stem if len(parts) == 1 else parts[0]
         if path.is_symlink() and (fault := _fault_of_link(path, inside)):
@@ -161,7 +170,9 @@ def _fault_of_link(path: Path, inside: Path) -> str:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError):
         return "a link that leads nowhere" if path.suffix.lower() in SHEET_SUFFIXES else ""
-    if target.is_relative_to(inside) or not (target.is_dir() or path.suffix.lower() in SHEET_SUFFIXES):
+    if target.is_relative_to(inside) or not (
+        target.is_dir() or path.suffix.lower() in SHEET_SUFFIXES
+    ):
         return ""
     return "a link out of the folder; it is not followed"
 

@@ -46,7 +46,11 @@ def fill(
     result = result_array((*batch, *tail), out)
     if not result.size:
         return result
-    rows = [state[None] for state in states] if not batch else [_rows(state, batch) for state in states]
+    rows = (
+        [state[None] for state in states]
+        if not batch
+        else [_rows(state, batch) for state in states]
+    )
     # A kernel writes the first results before it has read the last inputs.
     if out is not None and any(np.may_share_memory(out, row) for row in rows):
         rows = [row.copy() for row in rows]
@@ -66,7 +70,9 @@ def _batch(states: Sequence[Array]) -> tuple[int, ...]:
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
-        raise ValueError(f"the arguments' batch axes {', '.join(map(str, shapes))} do not broadcast") from None
+        raise ValueError(
+            f"the arguments' batch axes {', '.join(map(str, shapes))} do not broadcast"
+        ) from None
 
 
 def check_whole(name: str, value: object, least: int) -> None:
@@ -108,8 +114,15 @@ def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
     if out is None:
         return np.empty(shape)
     if not isinstance(out, np.ndarray):
-        raise ValueError(f"out is {type(out).__name__}; expected an array of shape {shape}, float64")
-    if out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous or not out.flags.writeable:
+        raise ValueError(
+            f"out is {type(out).__name__}; expected an array of shape {shape}, float64"
+        )
+    if (
+        out.shape != shape
+        or out.dtype != np.float64
+        or not out.flags.c_contiguous
+        or not out.flags.writeable
+    ):
         other_layout = "Fortran" if out.flags.f_contiguous else "strided"
         layout = "C" if out.flags.c_contiguous else other_layout
         raise ValueError(

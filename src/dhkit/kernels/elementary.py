@@ -86,7 +86,9 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     odd = absolute(absolute(quadrant) - 0.25) < 0.125
     s = select(odd, cosine, sine)
     c = select(odd, sine, cosine)
-    return select(opposite | (quadrant < -0.125), -s, s), select(opposite | (quadrant > 0.125), -c, c)
+    return select(opposite | (quadrant < -0.125), -s, s), select(
+        opposite | (quadrant > 0.125), -c, c
+    )
 
 
 def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute) -> Any:

@@ -41,7 +41,9 @@ class Interpreter:
         self._outputs = [variable.size for variable in graph.outputs]
         self._stages = Stages(self._staged)
 
-    def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
+    def __call__(
+        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
+    ) -> None:
         """Fill ``outputs``; all are arrays (N, size), as for :class:`dhkit.kernels.Kernel`."""
         count = len(inputs[0])
         if count == 1:
@@ -50,11 +52,16 @@ class Interpreter:
         start = 0
         while count - start >= _LANES:
             rows = slice(start, start + _LANES)
-            self._stages.work(_LANES, parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
+            self._stages.work(
+                _LANES, parameters, [x[rows] for x in inputs], [y[rows] for y in outputs]
+            )
             start += _LANES
         if count - start > _MAX_SINGLE_ITEMS:
             rows = slice(start, count)
-            padded = [np.concatenate([x[rows], np.zeros((start + _LANES - count, x.shape[1]))]) for x in inputs]
+            padded = [
+                np.concatenate([x[rows], np.zeros((start + _LANES - count, x.shape[1]))])
+                for x in inputs
+            ]
             results = [np.empty((_LANES, y.shape[1]), y.dtype) for y in outputs]
             self._stages.work(_LANES, parameters, padded, results)
             for y, result in zip(outputs, results, strict=True):
@@ -96,10 +103,14 @@ def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:
     for places, kind in zip(graph.results, types, strict=True):
         entries_of_result = [values[k] + missing if kind == FLOAT else values[k] for k in places]
         results.append(casadi.vertcat(*entries_of_result))
-    return casadi.Function(graph.name, [zero, *inputs], [casadi.densify(casadi.SX(x)) for x in results])
+    return casadi.Function(
+        graph.name, [zero, *inputs], [casadi.densify(casadi.SX(x)) for x in results]
+    )
 
 
-def _values(graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.SX, *, alike: bool) -> list[casadi.SX]:
+def _values(
+    graph: Graph, entries: Sequence[Sequence[casadi.SX]], zero: casadi.SX, *, alike: bool
+) -> list[casadi.SX]:
     """Return the value of every node; ``alike`` with the arc tangent of compiled kernels, not the C library's."""
     import casadi
 

@@ -60,7 +60,9 @@ class Kernel:
     independent; where an item's input is not finite, its float results are NaN.
     """
 
-    def __init__(self, name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str]) -> None:
+    def __init__(
+        self, name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str]
+    ) -> None:
         self.name = name
         self._pattern = pattern
         self._derive = derive
@@ -76,7 +78,11 @@ class Kernel:
         """Number of items asked for in batches that are not small."""
 
     def __call__(
-        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]], threads: int = 1
+        self,
+        parameters: Array,
+        inputs: Sequence[Array],
+        outputs: Sequence[NDArray[Any]],
+        threads: int = 1,
     ) -> None:
         """Fill ``outputs``; with several threads each takes a share of a large compiled batch."""
         count = len(inputs[0])
@@ -108,7 +114,9 @@ class Kernel:
                 self._compile()
 
     def __repr__(self) -> str:
-        return repr_line(f"Kernel {self.name}", summary="interpreted" if self._function is None else "compiled")
+        return repr_line(
+            f"Kernel {self.name}", summary="interpreted" if self._function is None else "compiled"
+        )
 
     def _function_for(self, count: int) -> CompiledFunction | None:
         """Return the machine code for a batch; None if the batch is to be interpreted.
@@ -206,7 +214,9 @@ def uncounted() -> Iterator[None]:
         _uncounted.depth -= 1
 
 
-def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str] = ("float64",)) -> Kernel:
+def kernel(
+    name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str] = ("float64",)
+) -> Kernel:
     """Return the kernel of a program, the same one each time.
 
     Parameters
@@ -246,4 +256,8 @@ def _after_fork_in_child() -> None:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(before=_before_fork, after_in_parent=_after_fork_in_parent, after_in_child=_after_fork_in_child)
+    os.register_at_fork(
+        before=_before_fork,
+        after_in_parent=_after_fork_in_parent,
+        after_in_child=_after_fork_in_child,
+    )

@@ -102,7 +102,10 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
     outputs = [f"%y{k}" for k in range(len(graph.outputs))]
     lines = [
-        *(f"declare {VECTOR} @llvm.{name}.v{WIDTH}f64({VECTOR})" for name in ("fabs", "sqrt", "floor")),
+        *(
+            f"declare {VECTOR} @llvm.{name}.v{WIDTH}f64({VECTOR})"
+            for name in ("fabs", "sqrt", "floor")
+        ),
         "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
         "entry:",
         *chain.from_iterable(_array(k, name) for k, name in enumerate((*inputs, *outputs))),
@@ -118,7 +121,15 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     ]
     for k, name in enumerate(inputs):
         before = f"read{k - 1}_end" if k else "block"
-        lines += _copied(f"read{k}", before, name, graph.inputs[k + 1].size, layout.inputs[k], "double", reading=True)
+        lines += _copied(
+            f"read{k}",
+            before,
+            name,
+            graph.inputs[k + 1].size,
+            layout.inputs[k],
+            "double",
+            reading=True,
+        )
         lines += [f"  br label %{f'read{k + 1}' if k + 1 < len(inputs) else 'compute'}"]
     lines += [
         "compute:",
@@ -132,7 +143,9 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     for k, name in enumerate(outputs):
         before = f"write{k - 1}_end" if k else "compute"
         kind = _STORED[types[k]]
-        lines += _copied(f"write{k}", before, name, graph.outputs[k].size, layout.outputs[k], kind, reading=False)
+        lines += _copied(
+            f"write{k}", before, name, graph.outputs[k].size, layout.outputs[k], kind, reading=False
+        )
         lines += [f"  br label %{f'write{k + 1}' if k + 1 < len(outputs) else 'written'}"]
     lines += [
         "written:",
@@ -196,7 +209,11 @@ def _apply(operation: str, arguments: Sequence[_Value]) -> _Value:
 
 def _number(value: _Value) -> Vector:
     """Return a value as numbers: 1 for true, 0 for false."""
-    return value if isinstance(value, Vector) else select(value, Vector(value.body, constant(1.0)), 0.0)
+    return (
+        value
+        if isinstance(value, Vector)
+        else select(value, Vector(value.body, constant(1.0)), 0.0)
+    )
 
 
 def _mask(value: _Value) -> Mask:
@@ -229,7 +246,9 @@ def _loaded(body: Body, row: int) -> Vector:
     return Vector(body, body.define(f"load {VECTOR}, ptr {_address(body, row)}, align 64"))
 
 
-def _copied(label: str, before: str, array: str, size: int, row: int, kind: str, *, reading: bool) -> Iterator[str]:
+def _copied(
+    label: str, before: str, array: str, size: int, row: int, kind: str, *, reading: bool
+) -> Iterator[str]:
     """Yield a loop over a block's items that copies rows of ``array`` into the block, or back.
 
     Parameters

@@ -19,13 +19,19 @@ _OPTIMIZATION = 2
 """LLVM's level for instruction selection and scheduling; for straight-line code no other passes are useful."""
 _ALIGNMENT = 64
 """Alignment of a block's rows, bytes."""
-_SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
+_SIGNATURE = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64
+)
 
 
 @cache
 def processor() -> tuple[str, str, str]:
     """Return this machine's triple, its processor's name and its features, as LLVM names them."""
-    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    return (
+        llvm.get_process_triple(),
+        llvm.get_host_cpu_name(),
+        llvm.get_host_cpu_features().flatten(),
+    )
 
 
 def compile_module(source: str, target: tuple[str, str, str] | None = None) -> bytes:
@@ -73,7 +79,9 @@ class CompiledFunction:
         self._alone: Stages | None = None
         """Stages for single items."""
 
-    def __call__(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
+    def __call__(
+        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
+    ) -> None:
         """Fill ``outputs``; all are arrays (N, size), C-contiguous."""
         count = len(inputs[0])
         if count == 1:
@@ -83,10 +91,14 @@ class CompiledFunction:
         for array in (*inputs, *outputs):
             # The machine code does not check its pointers.
             if not array.flags.c_contiguous or len(array) != count:
-                raise ValueError(f"a kernel was given an array of shape {array.shape} and strides {array.strides}")
+                raise ValueError(
+                    f"a kernel was given an array of shape {array.shape} and strides {array.strides}"
+                )
         self._call(np.ascontiguousarray(parameters), [*inputs, *outputs])()
 
-    def _stages(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> Stages:
+    def _stages(
+        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
+    ) -> Stages:
         """Return stages for single items of arrays such as these."""
         sizes = [array.shape[1] for array in inputs]
         kinds = [(array.shape[1], array.dtype) for array in outputs]
@@ -117,5 +129,10 @@ def _start() -> None:
 
 def _machine(triple: str, name: str, features: str) -> Any:
     return llvm.Target.from_triple(triple).create_target_machine(
-        cpu=name, features=features, opt=_OPTIMIZATION, reloc="static", codemodel="jitdefault", jit=True
+        cpu=name,
+        features=features,
+        opt=_OPTIMIZATION,
+        reloc="static",
+        codemodel="jitdefault",
+        jit=True,
     )

@@ -24,10 +24,14 @@ class Stage:
     kept: tuple[Any, ...] = ()
     """Objects that ``run`` needs and that must stay alive."""
 
-    def work(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
+    def work(
+        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
+    ) -> None:
         """Write the outputs (items, ...) of parameters (p,) and inputs (items, ...), in the units of the program."""
         self.parameters[...] = parameters
-        for k, staged in enumerate(self.inputs):  # for single items, zip(strict=True) would take as long as a copy
+        for k, staged in enumerate(
+            self.inputs
+        ):  # for single items, zip(strict=True) would take as long as a copy
             staged[...] = inputs[k]
         self.run()
         for k, staged in enumerate(self.outputs):
@@ -44,7 +48,13 @@ class Stages(threading.local):
         self._made = made
         self._idle: dict[int, Stage] = {}
 
-    def work(self, items: int, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> None:
+    def work(
+        self,
+        items: int,
+        parameters: Array,
+        inputs: Sequence[Array],
+        outputs: Sequence[NDArray[Any]],
+    ) -> None:
         """Compute ``items`` items; see :meth:`Stage.work`."""
         idle = self._idle
         stage = idle.pop(items, None) or self._made(items)

@@ -20,7 +20,15 @@ from dhkit.kernels.machine_code import processor
 
 log = logging.getLogger(__name__)
 
-PACKAGES = ("control", "description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
+PACKAGES = (
+    "control",
+    "description",
+    "dynamics",
+    "expressions",
+    "kernels",
+    "kinematics",
+    "symbolic",
+)
 """Packages of dhkit whose sources determine the results of a kernel."""
 _VERSIONS = ("casadi", "llvmlite", "numpy")
 """Packages whose versions determine programs and machine code."""
@@ -38,16 +46,25 @@ def cache_folder() -> Path | None:
     """
     given = os.environ.get("DHKIT_CACHE_DIR")
     try:
-        root = Path(given).expanduser() if given else Path(platformdirs.user_cache_dir("dhkit", appauthor=False))
+        root = (
+            Path(given).expanduser()
+            if given
+            else Path(platformdirs.user_cache_dir("dhkit", appauthor=False))
+        )
     except RuntimeError as error:
         if given:
-            raise DhkitError(f"DHKIT_CACHE_DIR is {given!r}: there is no such user; expected a folder") from None
+            raise DhkitError(
+                f"DHKIT_CACHE_DIR is {given!r}: there is no such user; expected a folder"
+            ) from None
         _warn_once(f"kernels are not cached: {error}")
         return None
     try:
         folder = _make_folder(Path.cwd() / root / "kernels").resolve()
         levels = ((level, level != folder) for level in (folder, *folder.parents))
-        foreign = next((level for level, above in levels if _writable_by_others(level.stat(), sticky=above)), None)
+        foreign = next(
+            (level for level, above in levels if _writable_by_others(level.stat(), sticky=above)),
+            None,
+        )
     except OSError as error:
         _warn_once(f"kernels are not cached: {root}: {error.strerror}")
         return None
@@ -96,7 +113,9 @@ def _own_group(gid: int) -> bool:
         user = pwd.getpwuid(os.geteuid())
     except KeyError:
         return False
-    return group.gr_name == user.pw_name and user.pw_gid == gid and set(group.gr_mem) <= {user.pw_name}
+    return (
+        group.gr_name == user.pw_name and user.pw_gid == gid and set(group.gr_mem) <= {user.pw_name}
+    )
 
 
 def digest(name: str, pattern: str) -> str:
@@ -134,11 +153,15 @@ def _own_file(path: Path) -> bytes:
         It is missing, another user's, a link, a folder or a pipe.
     """
     # Non-blocking, because opening a pipe would wait for a writer.
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+    handle = os.open(
+        path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    )
     with os.fdopen(handle, "rb") as file:
         status = os.fstat(handle)
         if not stat.S_ISREG(status.st_mode) or _writable_by_others(status):
-            raise PermissionError(errno.EPERM, "not a file that this user alone could have written", str(path))
+            raise PermissionError(
+                errno.EPERM, "not a file that this user alone could have written", str(path)
+            )
         return file.read()
 
 

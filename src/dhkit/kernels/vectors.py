@@ -42,7 +42,9 @@ class Vector:
     def _with(self, instruction: str, other: Number, *, swapped: bool = False) -> str:
         first = self.name
         second = _text(other)
-        return self.body.define(f"{instruction} {VECTOR} {f'{second}, {first}' if swapped else f'{first}, {second}'}")
+        return self.body.define(
+            f"{instruction} {VECTOR} {f'{second}, {first}' if swapped else f'{first}, {second}'}"
+        )
 
     def __add__(self, other: Number) -> Vector:
         return Vector(self.body, self._with(f"fadd {self.body.liberties}", other))
@@ -63,7 +65,9 @@ class Vector:
         return Vector(self.body, self._with(f"fsub {self.body.liberties}", other, swapped=True))
 
     def __neg__(self) -> Vector:
-        return Vector(self.body, self.body.define(f"fneg {self.body.liberties} {VECTOR} {self.name}"))
+        return Vector(
+            self.body, self.body.define(f"fneg {self.body.liberties} {VECTOR} {self.name}")
+        )
 
     # Ordered comparisons with NaN are false; ``differs`` is true.
 
@@ -87,7 +91,9 @@ class Vector:
     def call(self, intrinsic: str) -> Vector:
         """Return one of LLVM's functions of one number: fabs, sqrt or floor."""
         function = f"@llvm.{intrinsic}.v{WIDTH}f64({VECTOR} {self.name})"
-        return Vector(self.body, self.body.define(f"call {self.body.liberties} {VECTOR} {function}"))
+        return Vector(
+            self.body, self.body.define(f"call {self.body.liberties} {VECTOR} {function}")
+        )
 
 
 Number: TypeAlias = Vector | float

@@ -19,7 +19,13 @@ from dhkit.kinematics.manipulability import (
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
 from dhkit.kinematics.programs import export_kinematics, kinematic_kernels
-from dhkit.kinematics.singularities import Singularities, determinant, measures, singular_configurations, singularities
+from dhkit.kinematics.singularities import (
+    Singularities,
+    determinant,
+    measures,
+    singular_configurations,
+    singularities,
+)
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 from dhkit.kinematics.workspace import Estimate, Grid, Workspace, tool_reach, workspace
 from dhkit.symbolic import ReferenceAxes

@@ -66,7 +66,9 @@ class Axes:
 
     def parallel(self, i: int, j: int) -> bool:
         """Return whether axes i and j have the same or opposite direction."""
-        return bool(np.linalg.norm(np.cross(self.direction(i), self.direction(j))) <= self.tolerance)
+        return bool(
+            np.linalg.norm(np.cross(self.direction(i), self.direction(j))) <= self.tolerance
+        )
 
     def perpendicular(self, i: int, j: int) -> bool:
         """Return whether the directions of axes i and j are at right angles."""

@@ -79,7 +79,11 @@ def boundaries(description: Description) -> tuple[Boundary, ...]:
 
 def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
     """Return the boundaries of a ring in a plane that joint 1 turns about axis 1, with an offset across the plane."""
-    (side,) = (factor for factor in singularities(description).factors if isinstance(factor, ShoulderFactor))
+    (side,) = (
+        factor
+        for factor in singularities(description).factors
+        if isinstance(factor, ShoulderFactor)
+    )
     plane = ArmPlane.of(Axes.of(description))
     least, most = side.radii(description.numbers.lower, description.numbers.upper)
     # Over all q1 together: a point in front of axis 1 is reached from the front, from behind, or both.
@@ -95,13 +99,19 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
     def around(radius: float) -> Array:
         # A circle about axis 1, along e_u: p = origin + radius (cos(t) e_x + sin(t) e_v).
         turns = _unit_circle()
-        return np.asarray(plane.origin + radius * (turns[:, :1] * plane.R[0] + turns[:, 1:] * plane.R[2]))
+        return np.asarray(
+            plane.origin + radius * (turns[:, :1] * plane.R[0] + turns[:, 1:] * plane.R[2])
+        )
 
     nowhere = np.empty((0, 3))
     found = []
     if np.isfinite(most):
         # The farthest point of the ring is at x = a1 + most in a plane that passes axis 1 at the distance offset.
-        found.append(Boundary("outer", point, world(ring.outer), around(float(np.hypot(a1 + most, side.offset)))))
+        found.append(
+            Boundary(
+                "outer", point, world(ring.outer), around(float(np.hypot(a1 + most, side.offset)))
+            )
+        )
     inner = ring.inner
     if np.isfinite(inner).any() and least > _MIN_RADIUS * side.size:
         found.append(Boundary("inner", point, world(inner), nowhere))
@@ -185,8 +195,12 @@ def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
 
     def boundary(name: str, radius: float) -> Boundary:
         line = np.stack([[radius, 0.0, height] for height in heights])
-        circle = np.hstack([radius * _unit_circle(), np.full((_CIRCLE_SEGMENTS + 1, 1), heights[0])])
-        return Boundary(name, "tool", np.asarray(origin + line @ R), np.asarray(origin + circle @ R))
+        circle = np.hstack(
+            [radius * _unit_circle(), np.full((_CIRCLE_SEGMENTS + 1, 1), heights[0])]
+        )
+        return Boundary(
+            name, "tool", np.asarray(origin + line @ R), np.asarray(origin + circle @ R)
+        )
 
     radii = zip(("inner", "outer"), _radii(description, fit), strict=True)
     least = _MIN_RADIUS * float(np.asarray(p["reach"]))
@@ -198,8 +212,14 @@ def _radii(description: Description, fit: Fit) -> tuple[float, float]:
     p = {key: np.asarray(value, dtype=float) for key, value in fit.parameters.items()}
     numbers = description.numbers
     if "start" in p:
-        return slide_radii(float(p["start"]), float(p["lift"]), float(numbers.lower[1]), float(numbers.upper[1]))
-    return link_radii([float(p["L2"]), float(p["L3"]), float(np.linalg.norm(p["lever"]))][: fit.structure.count("R")])
+        return slide_radii(
+            float(p["start"]), float(p["lift"]), float(numbers.lower[1]), float(numbers.upper[1])
+        )
+    return link_radii(
+        [float(p["L2"]), float(p["L3"]), float(np.linalg.norm(p["lever"]))][
+            : fit.structure.count("R")
+        ]
+    )
 
 
 def _rises(description: Description, fit: Fit) -> Array:
@@ -209,7 +229,9 @@ def _rises(description: Description, fit: Fit) -> Array:
     joint = fit.structure.index("P")
     numbers = description.numbers
     limits = np.array([numbers.lower[joint], numbers.upper[joint]])
-    return np.asarray(np.where(np.isfinite(limits), np.asarray(fit.parameters["senses"])[joint] * limits, 0.0))
+    return np.asarray(
+        np.where(np.isfinite(limits), np.asarray(fit.parameters["senses"])[joint] * limits, 0.0)
+    )
 
 
 def _unit_circle() -> Array:

@@ -59,13 +59,17 @@ def collect(
     singular = np.any(special & SINGULARITIES != 0, axis=-1)
 
     reached = np.where(singular, IKStatus.singular, IKStatus.ok)
-    missed = np.where(is_beyond_all_links(description, positions), IKStatus.out_of_reach, IKStatus.not_found)
+    missed = np.where(
+        is_beyond_all_links(description, positions), IKStatus.out_of_reach, IKStatus.not_found
+    )
     status = np.where(found, reached, missed)
     status = np.where(posed, status, IKStatus.not_a_pose)
     return IKSolutions(
         q=q,
         valid=valid,
-        flags=np.where(valid & _outside(description, q), special | np.uint8(IKFlag.out_of_limits), special),
+        flags=np.where(
+            valid & _outside(description, q), special | np.uint8(IKFlag.out_of_limits), special
+        ),
         status_code=status.astype(np.uint8),
         distance=np.where(posed, np.where(found, 0.0, distance), np.nan),
         branches=branches,
@@ -128,7 +132,9 @@ def is_beyond_all_links(description: Description, positions: Array) -> NDArray[n
     with np.errstate(all="ignore"):
         away = np.linalg.norm(positions - chain[0], axis=-1)
         # The squares of positions above 1e154 m overflow: they are infinitely far away.
-        beyond: NDArray[np.bool_] = away > length + _BOUND_ROUNDING * (length + np.abs(positions).sum(axis=-1))
+        beyond: NDArray[np.bool_] = away > length + _BOUND_ROUNDING * (
+            length + np.abs(positions).sum(axis=-1)
+        )
         overflows: NDArray[np.bool_] = np.isinf(away)
     return np.asarray(beyond | overflows)
 
@@ -142,5 +148,7 @@ def _outside(description: Description, q: Array) -> NDArray[np.bool_]:
     # lower <= q + 2 pi k <= upper holds for some whole k if ceil((lower - q) / (2 pi)) <= floor((upper - q) / (2 pi)).
     with np.errstate(invalid="ignore"):
         windings = np.floor((upper - q) / math.tau) - np.ceil((lower - q) / math.tau)
-        outside: NDArray[np.bool_] = np.where(numbers.prismatic, (q < lower) | (q > upper), windings < 0)
+        outside: NDArray[np.bool_] = np.where(
+            numbers.prismatic, (q < lower) | (q > upper), windings < 0
+        )
     return np.asarray(outside.any(axis=-1))

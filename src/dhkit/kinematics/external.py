@@ -84,7 +84,9 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     q = q[closed]
     owner = owner[closed]
     if n == _RESTARTED_JOINTS or solver is None:
-        q, owner = _with_restarts(description, poses.reshape(-1, 4, 4), np.flatnonzero(posed), q, owner)
+        q, owner = _with_restarts(
+            description, poses.reshape(-1, 4, 4), np.flatnonzero(posed), q, owner
+        )
     table = _ordered(q, owner, posed.size)
     B = table.shape[1]
     return collect(
@@ -100,7 +102,11 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
 
 
 def _with_restarts(
-    description: Description, poses: Array, rows: NDArray[np.intp], q: Array, owner: NDArray[np.intp]
+    description: Description,
+    poses: Array,
+    rows: NDArray[np.intp],
+    q: Array,
+    owner: NDArray[np.intp],
 ) -> tuple[Array, NDArray[np.intp]]:
     """Return solutions (K, n) and the poses that they belong to, with those that iteration finds from random starts.
 
@@ -112,7 +118,9 @@ def _with_restarts(
         Solutions, shape (K, n), and the indices of their poses, shape (K,).
     """
     rng = np.random.default_rng(0)
-    has_curves = freedoms(description, "whole") < description.n  # infinitely many solutions: one is enough
+    has_curves = (
+        freedoms(description, "whole") < description.n
+    )  # infinitely many solutions: one is enough
     waiting = rows
     for _ in range(_MAX_ROUNDS):
         if has_curves:
@@ -121,10 +129,14 @@ def _with_restarts(
             break
         of_start = np.repeat(waiting, _STARTS)
         starts = rng.uniform(-np.pi, np.pi, (len(of_start), description.n))
-        found = solve_numerically(description, poses[of_start], starts, restarts=0, tolerance=_CLOSES, limits=False)
+        found = solve_numerically(
+            description, poses[of_start], starts, restarts=0, tolerance=_CLOSES, limits=False
+        )
         reached = found.valid[:, 0]
         before = np.bincount(owner, minlength=len(poses))
-        q, owner = _distinct(np.concatenate([q, found.q[reached, 0]]), np.concatenate([owner, of_start[reached]]))
+        q, owner = _distinct(
+            np.concatenate([q, found.q[reached, 0]]), np.concatenate([owner, of_start[reached]])
+        )
         waiting = waiting[np.bincount(owner, minlength=len(poses))[waiting] > before[waiting]]
     return q, owner
 
@@ -159,7 +171,9 @@ def _solver(description: Description) -> Any:
         solver = ssik.Manipulator.from_axes(axes.directions, offsets)
         solver.prepare()
     except (ValueError, ArithmeticError, NotImplementedError, np.linalg.LinAlgError) as error:
-        log.info("ssik refuses %s, which is solved by iteration: %s", description.name, str(error)[:200])
+        log.info(
+            "ssik refuses %s, which is solved by iteration: %s", description.name, str(error)[:200]
+        )
         return None
     return solver
 

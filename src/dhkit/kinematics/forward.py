@@ -12,7 +12,9 @@ from dhkit.symbolic import Graph, SymbolicTable, joint_symbols, table_pattern
 
 
 @takes_robot
-def forward_kinematics(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+def forward_kinematics(
+    description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
     """Return the tool's pose in the world, T_world_tool = base A_1 ... A_n tool.
 
     Parameters
@@ -41,10 +43,14 @@ def forward_kinematics(description: Description, q: ArrayLike, out: Array | None
 
 
 @takes_robot
-def frames(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
+def frames(
+    description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
     """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4); arguments as for :func:`forward_kinematics`."""
     run, parameters = frames_kernel(description)
-    return fill(run, parameters, [joint_array(description, q)], (description.n + 1, 4, 4), out, threads)
+    return fill(
+        run, parameters, [joint_array(description, q)], (description.n + 1, 4, 4), out, threads
+    )
 
 
 @lru_cache(maxsize=512)
@@ -64,7 +70,9 @@ def frames_kernel(description: Description) -> tuple[Kernel, Array]:
 def _tool_graph(description: Description) -> Graph:
     table, parameters = SymbolicTable.parametric(description)
     q = joint_symbols("q", description.n)
-    return Graph.of("forward_kinematics", {"parameters": parameters, "q": q}, {"T": table.world_to_tool(q)})
+    return Graph.of(
+        "forward_kinematics", {"parameters": parameters, "q": q}, {"T": table.world_to_tool(q)}
+    )
 
 
 def _frames_graph(description: Description) -> Graph:

@@ -24,7 +24,11 @@ _CHUNK = 16_384
 
 @takes_robot
 def inverse_kinematics(
-    description: Description, T: ArrayLike, seed: ArrayLike | None = None, out: Array | None = None, threads: int = 1
+    description: Description,
+    T: ArrayLike,
+    seed: ArrayLike | None = None,
+    out: Array | None = None,
+    threads: int = 1,
 ) -> IKSolutions:
     """Return all solutions of T_world_tool(q) = T in closed form.
 
@@ -69,10 +73,16 @@ def inverse_kinematics(
     batch = poses.shape[:-2]
     free = free_angles(description, solver.fit, seed, batch)
     found = solve_in_closed_form(description, solver, poses, free, out, threads)
-    return found if classify(description).neighbour is None else _with_poses_at_the_boundary(description, found, poses)
+    return (
+        found
+        if classify(description).neighbour is None
+        else _with_poses_at_the_boundary(description, found, poses)
+    )
 
 
-def _with_poses_at_the_boundary(description: Description, found: IKSolutions, poses: Array) -> IKSolutions:
+def _with_poses_at_the_boundary(
+    description: Description, found: IKSolutions, poses: Array
+) -> IKSolutions:
     """Return solutions of an arm that misses its family by at most 1e-12, near the boundary of the workspace too.
 
     There the miss counts by its square root: a pose that the arm reaches stretched may be 1e-6 of the reach beyond what
@@ -114,7 +124,11 @@ def _with_poses_at_the_boundary(description: Description, found: IKSolutions, po
 
 @takes_robot
 def inverse_kinematics_in_chunks(
-    description: Description, T: ArrayLike, size: int = _CHUNK, seed: ArrayLike | None = None, threads: int = 1
+    description: Description,
+    T: ArrayLike,
+    size: int = _CHUNK,
+    seed: ArrayLike | None = None,
+    threads: int = 1,
 ) -> Iterator[tuple[slice, IKSolutions]]:
     """Return an iterator over the solutions of many poses, ``size`` at a time, without memory for all of them.
 
@@ -148,25 +162,35 @@ def inverse_kinematics_in_chunks(
         raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
     starts = None if seed is None else joint_array(description, seed, "seed")
     if starts is not None and starts.shape not in ((description.n,), (len(poses), description.n)):
-        raise ValueError(f"seed has shape {starts.shape}; expected {(description.n,)} or {(len(poses), description.n)}")
+        raise ValueError(
+            f"seed has shape {starts.shape}; expected {(description.n,)} or {(len(poses), description.n)}"
+        )
     solver = solver_of(description)
     if solver is None:
-        raise ModelError(f"{description.name} is {classify(description).words}; expected an arm with a closed form")
+        raise ModelError(
+            f"{description.name} is {classify(description).words}; expected an arm with a closed form"
+        )
     q = np.empty((min(size, len(poses)), len(solver.fit.branches), description.n))
 
     def solve(begin: int) -> tuple[slice, IKSolutions]:
         rows = slice(begin, min(begin + size, len(poses)))
         near = starts if starts is None or starts.ndim == 1 else starts[rows]
-        return rows, inverse_kinematics(description, poses[rows], near, q[: rows.stop - rows.start], threads)
+        return rows, inverse_kinematics(
+            description, poses[rows], near, q[: rows.stop - rows.start], threads
+        )
 
     return map(solve, range(0, len(poses), size))
 
 
-def _solved_otherwise(description: Description, T: Array, seed: ArrayLike | None, out: Array | None) -> IKSolutions:
+def _solved_otherwise(
+    description: Description, T: Array, seed: ArrayLike | None, out: Array | None
+) -> IKSolutions:
     """Return the solutions of an arm without a closed form: from those of its neighbour, or else by ssik."""
     if out is not None:
         words = classify(description).words
-        raise ValueError(f"out is given, but {description.name} is {words}: how many branches there will be is open")
+        raise ValueError(
+            f"out is given, but {description.name} is {words}: how many branches there will be is open"
+        )
     if classify(description).neighbour is not None:
         from dhkit.kinematics.neighbour import solve_from_neighbour  # with SciPy's rotations, 60 ms
 

@@ -103,7 +103,9 @@ def jacobian_kernel(description: Description, frame: ReferenceAxes) -> tuple[Ker
 def jacobian_dot_kernel(description: Description, frame: ReferenceAxes) -> tuple[Kernel, Array]:
     """Return the kernel of :func:`jacobian_dot` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
-    return kernel(f"jacobian_dot_{frame}", pattern, lambda: _dot_graph(description, frame)), parameters
+    return kernel(
+        f"jacobian_dot_{frame}", pattern, lambda: _dot_graph(description, frame)
+    ), parameters
 
 
 def _check_frame(frame: str) -> None:

@@ -45,11 +45,15 @@ class Ellipsoid:
         shape = self.lengths.shape[:-1]
         if shape:
             return repr_line("Ellipsoid", summary=f"a batch of shape {shape}")
-        return repr_line("Ellipsoid", summary=f"half axes {listed(self.lengths)} about {listed(self.center)} m")
+        return repr_line(
+            "Ellipsoid", summary=f"half axes {listed(self.lengths)} about {listed(self.center)} m"
+        )
 
 
 @takes_robot
-def manipulability(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+def manipulability(
+    description: Description, q: ArrayLike, motion: Motion = "translational"
+) -> Array:
     """Return Yoshikawa's manipulability: the volume of the velocity ellipsoid for joint rates of unit norm, unscaled.
 
     It is sqrt(det(J J^T)) (Yoshikawa, Manipulability of Robotic Mechanisms, 1985, eq. 9). For an arm that can never
@@ -112,14 +116,18 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
 
 
 @takes_robot
-def condition_number(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+def condition_number(
+    description: Description, q: ArrayLike, motion: Motion = "translational"
+) -> Array:
     """Return the ratio of the largest to the smallest singular value, infinite where singular; see :func:`isotropy`."""
     with np.errstate(divide="ignore"):
         return 1.0 / isotropy(description, q, motion)
 
 
 @takes_robot
-def singular_values(description: Description, q: ArrayLike, motion: Motion = "translational") -> Array:
+def singular_values(
+    description: Description, q: ArrayLike, motion: Motion = "translational"
+) -> Array:
     """Return the Jacobian's singular values, the largest first.
 
     Arguments are those of :func:`manipulability`.
@@ -151,7 +159,9 @@ def freedoms(description: Description, motion: Motion = "translational") -> int:
 
 
 @takes_robot
-def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "translational") -> Ellipsoid:
+def velocity_ellipsoid(
+    description: Description, q: ArrayLike, motion: Motion = "translational"
+) -> Ellipsoid:
     """Return the tool's velocities for joint rates of unit norm: the ellipsoid v^T (J J^T)^-1 v = 1.
 
     Parameters
@@ -192,7 +202,9 @@ def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = 
 
 
 @takes_robot
-def force_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "translational") -> Ellipsoid:
+def force_ellipsoid(
+    description: Description, q: ArrayLike, motion: Motion = "translational"
+) -> Ellipsoid:
     """Return the tool's forces (moments) for joint torques of unit norm: the ellipsoid f^T J J^T f = 1.
 
     It has the axes of the :func:`velocity_ellipsoid` and reciprocal lengths: where the tool moves fast it holds

@@ -26,7 +26,13 @@ from scipy.spatial.transform import Rotation
 
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import SINGULARITIES, are_poses, collect, is_beyond_all_links, orthonormal
+from dhkit.kinematics.candidates import (
+    SINGULARITIES,
+    are_poses,
+    collect,
+    is_beyond_all_links,
+    orthonormal,
+)
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.newton import Newton
@@ -55,7 +61,9 @@ _SAME_ANGLE = 1e-6
 """Joint values, rad or share of the reach, that differ by less are the same solution."""
 
 
-def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike | None = None) -> IKSolutions:
+def solve_from_neighbour(
+    description: Description, T: ArrayLike, seed: ArrayLike | None = None
+) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T that Newton's method finds from those of the neighbouring arm.
 
     Parameters
@@ -85,11 +93,19 @@ def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike
     flags = np.zeros((len(rows), B), dtype=np.uint8)
     for begin in range(0, len(rows), _CHUNK):
         some = begin + np.flatnonzero(posed[begin : begin + _CHUNK])
-        q[some, :-1], flags[some, :-1] = _refined_branches(description, solver, rows[some], free[some])
+        q[some, :-1], flags[some, :-1] = _refined_branches(
+            description, solver, rows[some], free[some]
+        )
 
-    missing = posed & np.isnan(q).any(axis=-1).all(axis=-1) & ~is_beyond_all_links(description, rows[:, :3, 3])
+    missing = (
+        posed
+        & np.isnan(q).any(axis=-1).all(axis=-1)
+        & ~is_beyond_all_links(description, rows[:, :3, 3])
+    )
     if missing.any():
-        iterated = solve_numerically(description, rows[missing], restarts=_OTHER_STARTS, limits=False)
+        iterated = solve_numerically(
+            description, rows[missing], restarts=_OTHER_STARTS, limits=False
+        )
         q[missing, -1] = iterated.q[:, 0]
     return collect(
         description,
@@ -157,7 +173,9 @@ def _followed(description: Description, starts: Array, goals: Array) -> Array:
     T_start = world_to_tool(description, starts)
     T_goal = goals.reshape(-1, 4, 4)
     displacement = T_goal[:, :3, 3] - T_start[:, :3, 3]
-    phi = Rotation.from_matrix(T_goal[:, :3, :3] @ np.swapaxes(T_start[:, :3, :3], 1, 2)).as_rotvec()
+    phi = Rotation.from_matrix(
+        T_goal[:, :3, :3] @ np.swapaxes(T_start[:, :3, :3], 1, 2)
+    ).as_rotvec()
 
     q = starts
     for s in np.arange(1, _PATH_STEPS) / _PATH_STEPS:
@@ -169,7 +187,9 @@ def _followed(description: Description, starts: Array, goals: Array) -> Array:
     return _refined(description, q, goals)
 
 
-def _starts(description: Description, solver: Solver, poses: Array, free: Array) -> tuple[Array, NDArray[np.uint8]]:
+def _starts(
+    description: Description, solver: Solver, poses: Array, free: Array
+) -> tuple[Array, NDArray[np.uint8]]:
     """Return the neighbour's solutions (N, B, n) at poses (N, 4, 4), or at displaced ones if it has none, and flags."""
     exact = solve_in_closed_form(description, solver, poses, free)
     q = exact.q

@@ -107,7 +107,9 @@ class Newton:
         """
         n = self.description.n
         J = jacobian(self.description, q).reshape(-1, 6 * n)
-        parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
+        parameters = np.concatenate(
+            [[self.length], self.units, self.endless, self.lower, self.upper]
+        )
 
         new = np.empty_like(q)
         run = step_kernel(n, self.size)

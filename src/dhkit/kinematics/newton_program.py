@@ -80,7 +80,9 @@ def step_program(n: int, size: int) -> Graph:
 
 def _stays(q: _SX, descent: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     """Return whether a joint is at a limit and descent pushes it outward; an endless joint never stays."""
-    outward = ca.logic_or(ca.logic_and(q >= upper, descent > 0), ca.logic_and(q <= lower, descent < 0))
+    outward = ca.logic_or(
+        ca.logic_and(q >= upper, descent > 0), ca.logic_and(q <= lower, descent < 0)
+    )
     return ca.logic_and(outward, ca.logic_not(endless))
 
 

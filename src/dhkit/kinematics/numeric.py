@@ -242,7 +242,13 @@ class NumericSearch:
         return np.concatenate([position, rows[:, :, :3].reshape(-1, 9) / np.sqrt(2)], axis=1)
 
     def _improve(
-        self, q: Array, error: Array, rows: NDArray[np.intp], goals: Array, first: Array, starts: Array
+        self,
+        q: Array,
+        error: Array,
+        rows: NDArray[np.intp],
+        goals: Array,
+        first: Array,
+        starts: Array,
     ) -> None:
         """Search from starts (M, k, n) and store better results in rows of ``q`` and ``error``."""
         count, k, n = starts.shape
@@ -289,7 +295,9 @@ class _Descent:
         error = newton.error(q, goals)
         N = len(q)
         cost = np.sum(error**2, axis=1)
-        return cls(np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp))
+        return cls(
+            np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp)
+        )
 
     def selected(self, keep: NDArray[np.bool_]) -> _Descent:
         """Return the searches marked in ``keep``, shape (N,)."""

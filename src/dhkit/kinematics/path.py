@@ -60,7 +60,9 @@ class IKPath:
             )
         if self.switches:
             places = ", ".join(map(str, self.switches[:5]))
-            raise UnreachableError(f"the path has to switch branches {len(self.switches)} times, before pose {places}")
+            raise UnreachableError(
+                f"the path has to switch branches {len(self.switches)} times, before pose {places}"
+            )
         return self.q
 
     def __repr__(self) -> str:
@@ -70,7 +72,9 @@ class IKPath:
         named = dict.fromkeys(self.near_singular, "near a singularity")
         named |= dict.fromkeys(self.switches, "switched") | dict.fromkeys(self.lost, "lost")
         # Consecutive poses with the same note share a line.
-        runs = groupby(enumerate(sorted(named)), lambda at: (at[1] - at[0], named[at[1]], self.branch[at[1]]))
+        runs = groupby(
+            enumerate(sorted(named)), lambda at: (at[1] - at[0], named[at[1]], self.branch[at[1]])
+        )
         rows = []
         for (_, what, branch), run in runs:
             places = [place for _, place in run]
@@ -87,7 +91,9 @@ class IKPath:
 
 
 @takes_robot
-def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
+def follow_path(
+    description: Description, T: ArrayLike, q0: ArrayLike, *, limits: bool = True
+) -> IKPath:
     """Follow one branch along a path of poses.
 
     At the first pose the branch nearest to ``q0`` is taken, then at each pose the solution nearest to the last one,
@@ -156,7 +162,9 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
         switches=tuple(switches),
         lost=tuple(lost),
         start=float(np.abs(reached[0] - q0).max()) if len(reached) else float("nan"),
-        near_singular=_near_singular(description, q, "whole" if len(solutions.met) == 6 else "translational"),
+        near_singular=_near_singular(
+            description, q, "whole" if len(solutions.met) == 6 else "translational"
+        ),
     )
 
 
@@ -179,4 +187,6 @@ def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[
     J[:, :3] /= description.reach or 1.0
     J = J if motion == "whole" else J[:, :3]
     smallest = np.linalg.svd(J, compute_uv=False)[:, freedoms(description, motion) - 1]
-    return tuple(int(k) for k in np.flatnonzero((smallest < _NEAR_SINGULAR) & ~np.isnan(q).any(axis=-1)))
+    return tuple(
+        int(k) for k in np.flatnonzero((smallest < _NEAR_SINGULAR) & ~np.isnan(q).any(axis=-1))
+    )

@@ -32,7 +32,9 @@ def kinematic_kernels(description: Description) -> list[Kernel]:
 
 
 @takes_robot
-def export_kinematics(description: Description, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
+def export_kinematics(
+    description: Description, folder: str | Path, name: str | None = None
+) -> tuple[Path, Path]:
     """Write forward kinematics, Jacobian and, where it has a closed form, inverse kinematics as ``NAME.c`` and ``.h``.
 
     Parameters
@@ -68,18 +70,28 @@ def export_kinematics(description: Description, folder: str | Path, name: str | 
     found = classify(description)
     remark = f"{description.name}: {found.words}. Written by dhkit."
     if found.family is not None and found.fit is not None:
-        from dhkit.kinematics.closed_form.program import arm_program  # CasADi, which takes time to import
+        from dhkit.kinematics.closed_form.program import (
+            arm_program,  # CasADi, which takes time to import
+        )
 
         numbers = description.numbers
         prismatic = tuple(bool(slides) for slides in numbers.prismatic)
         limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
-        graphs.append(arm_program(found.family, found.fit, prismatic, limits).renamed(f"{name}_inverse_kinematics"))
+        graphs.append(
+            arm_program(found.family, found.fit, prismatic, limits).renamed(
+                f"{name}_inverse_kinematics"
+            )
+        )
     return export_c(graphs, folder, name, remark)
 
 
 def _forward(description: Description, name: str) -> Graph:
     q = joint_symbols("q", description.n)
-    return Graph.of(f"{name}_forward_kinematics", {"q": q}, {"T": SymbolicTable.of(description).world_to_tool(q)})
+    return Graph.of(
+        f"{name}_forward_kinematics",
+        {"q": q},
+        {"T": SymbolicTable.of(description).world_to_tool(q)},
+    )
 
 
 def _jacobian(description: Description, name: str) -> Graph:

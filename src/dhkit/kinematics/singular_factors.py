@@ -56,7 +56,9 @@ class AngleFactor:
             return f"{name} = {first} or {second}: {at_zero}"
         return f"{name} = {first} ({at_zero}) or {second} ({at_pi})"
 
-    def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+    def moved_onto_singularity(
+        self, q: Array, lower: Array, upper: Array, rng: np.random.Generator
+    ) -> Array:
         """Return joint values q (k, n), rad and m, with this joint at a zero of the factor, inside limits if it can."""
         low = lower[self.joint]
         high = upper[self.joint]
@@ -96,7 +98,9 @@ class SlideFactor:
         near = f"{self.lift:.6g} m from {axis}, as near as it gets" if self.lift else f"on {axis}"
         return f"q{self.joint + 1} = {self.values[0]:.6g} m: {point} is {near}"
 
-    def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+    def moved_onto_singularity(
+        self, q: Array, lower: Array, upper: Array, rng: np.random.Generator
+    ) -> Array:
         """Return joint values q (k, n), rad and m, with this joint moved to the zero of the factor."""
         moved = q.copy()
         moved[:, self.joint] = self.values[0]
@@ -176,7 +180,11 @@ class ShoulderFactor:
         """Return the joint positions where the factor vanishes, in words."""
         if self.never_vanishes:
             return f"never: {point} cannot come to axis 1"
-        place = f"on the cylinder of radius {abs(self.offset):.6g} m about axis 1" if self.offset else "on axis 1"
+        place = (
+            f"on the cylinder of radius {abs(self.offset):.6g} m about axis 1"
+            if self.offset
+            else "on axis 1"
+        )
         return f"{point} is {place}: {self.equation}"
 
     @property
@@ -187,10 +195,14 @@ class ShoulderFactor:
         for link in self.links:
             terms += link.terms(least)
         turned = np.sign(terms[0][0])
-        text = "".join(f" {'+' if turned * c > 0 else '-'} {_product(abs(c), name)}" for c, name in terms)
+        text = "".join(
+            f" {'+' if turned * c > 0 else '-'} {_product(abs(c), name)}" for c, name in terms
+        )
         return text.removeprefix(" + ") + " = 0"
 
-    def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+    def moved_onto_singularity(
+        self, q: Array, lower: Array, upper: Array, rng: np.random.Generator
+    ) -> Array:
         """Return joint values q (k, n), rad and m, with joint 2 moved to x = 0, inside limits if possible; else NaN."""
         # a1 + Re(e^(i q2) A) = a1 + |A| cos(q2 + arg A) = 0, so that q2 = +-arccos(-a1 / |A|) - arg A. The arccosine is
         # NaN where the links are too short, |A| < |a1|. With a1 = 0 it is pi / 2 for every A, 0 included.
@@ -199,7 +211,9 @@ class ShoulderFactor:
         with np.errstate(invalid="ignore", divide="ignore"):
             apart = np.arccos(-self.a1 / length) if self.a1 else np.full(len(q), np.pi / 2)
         side = rng.choice([-1.0, 1.0], len(q))
-        both = _wind_into_limits(np.stack([side * apart, -side * apart]) - np.angle(arm), lower[1], upper[1])
+        both = _wind_into_limits(
+            np.stack([side * apart, -side * apart]) - np.angle(arm), lower[1], upper[1]
+        )
         inside = (both[0] >= lower[1]) & (both[0] <= upper[1])
         moved = q.copy()
         moved[:, 1] = np.where(inside, both[0], both[1])

@@ -25,7 +25,14 @@ from dhkit.display import html_table, repr_line
 from dhkit.errors import ModelError
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
-from dhkit.kinematics.singular_factors import AngleFactor, Factor, Kind, Link, ShoulderFactor, SlideFactor
+from dhkit.kinematics.singular_factors import (
+    AngleFactor,
+    Factor,
+    Kind,
+    Link,
+    ShoulderFactor,
+    SlideFactor,
+)
 
 _DRAWS = 256
 """Smallest number of random states that are drawn at once to find states that are singular inside limits."""
@@ -68,7 +75,10 @@ class Singularities:
     @property
     def joints(self) -> dict[str, int | None]:
         """Index, from 0, of the joint that decides each kind; None for the shoulder."""
-        return {factor.kind: None if isinstance(factor, ShoulderFactor) else factor.joint for factor in self.factors}
+        return {
+            factor.kind: None if isinstance(factor, ShoulderFactor) else factor.joint
+            for factor in self.factors
+        }
 
     def __str__(self) -> str:
         return "\n".join(f"{kind}: {text}" for kind, text in self.words.items())
@@ -77,7 +87,9 @@ class Singularities:
         return repr_line("Singularities", summary=", ".join(self.kinds))
 
     def _repr_html_(self) -> str:
-        return html_table(("singular", "where"), list(self.words.items()), longest=_MAX_WORDS_LENGTH)
+        return html_table(
+            ("singular", "where"), list(self.words.items()), longest=_MAX_WORDS_LENGTH
+        )
 
 
 @takes_robot
@@ -166,7 +178,9 @@ def determinant(description: Description, q: ArrayLike) -> Array:
 
 
 @takes_robot
-def singular_configurations(description: Description, kind: str, count: int, seed: int = 0) -> Array:
+def singular_configurations(
+    description: Description, kind: str, count: int, seed: int = 0
+) -> Array:
     """Return random joint positions at one kind of singularity, inside the joint limits where possible.
 
     Parameters
@@ -212,7 +226,9 @@ def singular_configurations(description: Description, kind: str, count: int, see
     found: Array = np.concatenate([*inside, *outside])[:count]
     if len(found) < count:
         where = singularities(description).words[kind]
-        raise ModelError(f"{description.name}: found {len(found)} of {count} {kind} singularities ({where})")
+        raise ModelError(
+            f"{description.name}: found {len(found)} of {count} {kind} singularities ({where})"
+        )
     return found
 
 
@@ -251,7 +267,11 @@ _TURNING_TOO = np.eye(6)[[0, 1, 2, 5]]
 def _elbow_wrist(fit: Fit) -> _Parts:
     # abs(det J) = abs(x) L2 L3 abs(sin(elbow)) abs(sin(wrist))
     p = _parameters(fit)
-    return (_side(p, _links(p)), _elbow(p), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", _WHOLE
+    return (
+        (_side(p, _links(p)), _elbow(p), _wrist(p, "axes 4 and 6 coincide")),
+        "the wrist centre",
+        _WHOLE,
+    )
 
 
 def _slide_wrist(fit: Fit) -> _Parts:
@@ -266,7 +286,11 @@ def _slide_wrist(fit: Fit) -> _Parts:
 def _three_parallel(fit: Fit) -> _Parts:
     # The product of the arms with a spherical wrist, where x has a third link: the lever from axis 4 to the point.
     p = _parameters(fit)
-    factors = _side(p, (*_links(p), _lever(p))), _elbow(p), _wrist(p, "axis 6 is parallel to axes 2, 3 and 4")
+    factors = (
+        _side(p, (*_links(p), _lever(p))),
+        _elbow(p),
+        _wrist(p, "axis 6 is parallel to axes 2, 3 and 4"),
+    )
     return factors, "the point where axes 5 and 6 meet", _WHOLE
 
 
@@ -331,7 +355,9 @@ def _side(p: Mapping[str, Array], links: tuple[Link, ...]) -> ShoulderFactor:
 def _elbow(p: Mapping[str, Array], joint: int = 2, sense: float | None = None) -> AngleFactor:
     sense = float(p["sense3"]) if sense is None else sense
     size = float(p["L2"] * p["L3"])
-    return AngleFactor("elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, _STRETCHED)
+    return AngleFactor(
+        "elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, _STRETCHED
+    )
 
 
 def _wrist(p: Mapping[str, Array], words: str) -> AngleFactor:

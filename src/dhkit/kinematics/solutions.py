@@ -122,12 +122,22 @@ class IKSolutions:
             No branch, or more than one, has all these words.
         """
         if not isinstance(name, str):
-            raise TypeError(f"branch {name!r}; expected words of one of {', '.join(map(repr, self.branches))}")
-        words = name.lower().replace("no flip", "no-flip").replace("noflip", "no-flip").replace(",", " ").split()
+            raise TypeError(
+                f"branch {name!r}; expected words of one of {', '.join(map(repr, self.branches))}"
+            )
+        words = (
+            name.lower()
+            .replace("no flip", "no-flip")
+            .replace("noflip", "no-flip")
+            .replace(",", " ")
+            .split()
+        )
         chosen = [k for k, branch in enumerate(self.branches) if set(words) <= set(branch.split())]
         if len(chosen) != 1:
             found = "no branch" if not chosen else f"{len(chosen)} branches"
-            raise ValueError(f"{name!r} fits {found}; expected one of {', '.join(map(repr, self.branches))}")
+            raise ValueError(
+                f"{name!r} fits {found}; expected one of {', '.join(map(repr, self.branches))}"
+            )
         return self.q[..., chosen[0], :]
 
     def nearest(self, q: ArrayLike) -> Array:
@@ -195,7 +205,9 @@ class IKSolutions:
             A batch of poses, or no such branch.
         """
         if self.distance.shape != ():
-            raise ValueError(f"windings of a batch of shape {self.distance.shape}; expected one pose")
+            raise ValueError(
+                f"windings of a batch of shape {self.distance.shape}; expected one pose"
+            )
         q = self.branch(branch)
         choices = [self._choices(i, float(q[i])) for i in range(len(q))]
         return [np.array(choice) for choice in product(*choices)]
@@ -236,12 +248,31 @@ class IKSolutions:
         for k, branch in enumerate(self.branches):
             if self.valid[k]:
                 values = zip(self.q[k] * scale, self.prismatic, strict=True)
-                numbers = [f"{round(x, 4) + 0.0:.4f}" if slides else f"{round(x, 2) + 0.0:.2f}" for x, slides in values]
-                rows.append((branch, *numbers, "inside" if self.allowed[k] else "outside", _special(self.flags[k])))
+                numbers = [
+                    f"{round(x, 4) + 0.0:.4f}" if slides else f"{round(x, 2) + 0.0:.2f}"
+                    for x, slides in values
+                ]
+                rows.append(
+                    (
+                        branch,
+                        *numbers,
+                        "inside" if self.allowed[k] else "outside",
+                        _special(self.flags[k]),
+                    )
+                )
             elif len(self) <= MOST_ROWS:
                 rows.append((branch, *("–" for _ in units), "", "not reached"))
-        headings = ("branch", *(f"q{i} [{unit}]" for i, unit in enumerate(units, start=1)), "limits", "special")
-        table = html_table(headings, rows, align="l" + "r" * len(units) + "l") if self.valid.any() else ""
+        headings = (
+            "branch",
+            *(f"q{i} [{unit}]" for i, unit in enumerate(units, start=1)),
+            "limits",
+            "special",
+        )
+        table = (
+            html_table(headings, rows, align="l" + "r" * len(units) + "l")
+            if self.valid.any()
+            else ""
+        )
         return html_block(f"{counted(len(self), 'branch')}: {self._summary}", table)
 
     def _batch_html(self) -> str:
@@ -293,7 +324,9 @@ class IKSolutions:
         if near.shape[-1:] == expected[-1:] and near.ndim <= len(expected):
             with contextlib.suppress(ValueError):
                 return np.broadcast_to(near, expected)
-        raise ValueError(f"joint values have shape {near.shape}; expected {expected[-1:]} or {expected}")
+        raise ValueError(
+            f"joint values have shape {near.shape}; expected {expected[-1:]} or {expected}"
+        )
 
     def _closest(self, q: Array, near: Array, usable: NDArray[np.bool_]) -> Array:
         """Return the usable branch with the least squared distance from ``near``, (..., n); NaN if there is none."""
@@ -309,7 +342,11 @@ class IKSolutions:
         if np.isnan(value):
             return []
         if self.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
-            return [value] if lower - LIMIT_SLACK <= value <= upper + LIMIT_SLACK or np.isinf(upper - lower) else []
+            return (
+                [value]
+                if lower - LIMIT_SLACK <= value <= upper + LIMIT_SLACK or np.isinf(upper - lower)
+                else []
+            )
 
         # All whole k with lower <= value + 2 pi k <= upper.
         first = int(np.ceil((lower - LIMIT_SLACK - value) / math.tau))
@@ -324,10 +361,14 @@ class IKSolutions:
         if status is IKStatus.not_a_pose:
             return f"{where}{others} is not a pose: NaN, or a rotation that is not orthonormal"
         if status is IKStatus.not_found:
-            return f"{where}{others}: no solution was found, which does not prove that there is none"
+            return (
+                f"{where}{others}: no solution was found, which does not prove that there is none"
+            )
         if status is IKStatus.out_of_reach:
             distance = float(self.distance[place])
-            return f"{where}{others} is out of reach" + (f" by {distance:.4g} m" if distance > 0 else "")
+            return f"{where}{others} is out of reach" + (
+                f" by {distance:.4g} m" if distance > 0 else ""
+            )
         return f"{where}{others} is reached only outside the joint limits"
 
 

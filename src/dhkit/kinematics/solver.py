@@ -52,7 +52,12 @@ def solver_for(description: Description, family: Family, fit: Fit) -> Solver:
 
 
 def solve_in_closed_form(
-    description: Description, solver: Solver, poses: Array, free: Array, out: Array | None = None, threads: int = 1
+    description: Description,
+    solver: Solver,
+    poses: Array,
+    free: Array,
+    out: Array | None = None,
+    threads: int = 1,
 ) -> IKSolutions:
     """Return the solutions of a closed form.
 
@@ -88,13 +93,19 @@ def solve_in_closed_form(
             flags.reshape(count, B),
             status.reshape(count, 1),
         ]
-        solver.kernel(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
-        is_one_in_reach = count == 1 and distance.item() == 0.0  # a single call has no time to look for others
+        solver.kernel(
+            solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads
+        )
+        is_one_in_reach = (
+            count == 1 and distance.item() == 0.0
+        )  # a single call has no time to look for others
         if fit.ring is not None and fit.parameters["offset"] and not is_one_in_reach:
             # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
             beyond = np.flatnonzero(distance.reshape(count) > 0)
             if beyond.size:
-                distance.reshape(count)[beyond] = nearest_wrist_distance(fit, poses.reshape(count, 4, 4)[beyond])
+                distance.reshape(count)[beyond] = nearest_wrist_distance(
+                    fit, poses.reshape(count, 4, 4)[beyond]
+                )
     return IKSolutions(
         q=q,
         valid=valid.view(np.bool_),
@@ -107,7 +118,9 @@ def solve_in_closed_form(
     )
 
 
-def free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
+def free_angles(
+    description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]
+) -> Array:
     """Return the angles that joint 1 and the wrist's free joint take where they are free, shape (..., 2), rad."""
     if seed is None:
         return np.zeros((*batch, 2))
@@ -116,5 +129,7 @@ def free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batc
         joints = joint_array(description, start, "seed")[..., [0, fit.free or 0]]
         angles = np.broadcast_to(joints, (*batch, 2))
     except ValueError:
-        raise ValueError(f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}") from None
+        raise ValueError(
+            f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}"
+        ) from None
     return np.ascontiguousarray(np.where(np.abs(angles) <= EXACT_RANGE, angles, 0.0))

@@ -109,7 +109,9 @@ class Workspace:
 
     def __repr__(self) -> str:
         estimate = "" if self.estimate is None else f", {self.estimate}"
-        return repr_line("Workspace", self.description.name, f"{counted(self.samples, 'sample')}{estimate}")
+        return repr_line(
+            "Workspace", self.description.name, f"{counted(self.samples, 'sample')}{estimate}"
+        )
 
     def _repr_html_(self) -> str:
         box = self.bounds
@@ -118,12 +120,22 @@ class Workspace:
             ("samples", f"{self.samples}, seed {self.seed}"),
             ("distance from axis 1", _range(self.radii)),
             ("distance from frame 0", _range(self.distances)),
-            *((f"{axis}, world", _range((low, high))) for axis, low, high in zip("xyz", *box, strict=True)),
-            ("largest manipulability", f"{self.manipulability[best]:.4g} at {listed(self.positions[best])} m"),
+            *(
+                (f"{axis}, world", _range((low, high)))
+                for axis, low, high in zip("xyz", *box, strict=True)
+            ),
+            (
+                "largest manipulability",
+                f"{self.manipulability[best]:.4g} at {listed(self.positions[best])} m",
+            ),
         ]
-        size = ("length", "area", "volume")[(self.grid.counts.ndim if self.grid is not None else 3) - 1]
+        size = ("length", "area", "volume")[
+            (self.grid.counts.ndim if self.grid is not None else 3) - 1
+        ]
         facts += [] if self.estimate is None else [(size, str(self.estimate))]
-        return html_block(f"Workspace of {self.description.name}", html_table((), facts), html_lines(self.assumed))
+        return html_block(
+            f"Workspace of {self.description.name}", html_table((), facts), html_lines(self.assumed)
+        )
 
     @property
     def samples(self) -> int:
@@ -138,7 +150,9 @@ class Workspace:
     @property
     def distances(self) -> tuple[float, float]:
         """The least and the largest distance of the tool from frame 0's origin, m."""
-        return _extremes(np.linalg.norm(self.positions - self.description.numbers.T_world_base[:3, 3], axis=1))
+        return _extremes(
+            np.linalg.norm(self.positions - self.description.numbers.T_world_base[:3, 3], axis=1)
+        )
 
     @property
     def radii(self) -> tuple[float, float]:
@@ -163,7 +177,9 @@ def tool_reach(description: Description) -> float:
     ``description.reach`` is an upper bound of another distance: the sum of all lengths.
     """
     lower, upper, _ = _ranges(description)
-    q = lower + (upper - lower) * np.random.default_rng(0).random((_STATES_FOR_REACH, description.n))
+    q = lower + (upper - lower) * np.random.default_rng(0).random(
+        (_STATES_FOR_REACH, description.n)
+    )
     return _radii(description, world_to_tool(description, q)[:, :3, 3])[1]
 
 
@@ -241,7 +257,9 @@ def workspace(
         manipulability=measures,
         best=best,
         freedoms=freedoms(description),
-        grid=occupancy(positions, edge, _FLAT * max(description.reach, float(np.abs(positions).max()))),
+        grid=occupancy(
+            positions, edge, _FLAT * max(description.reach, float(np.abs(positions).max()))
+        ),
     )
 
 
@@ -277,7 +295,9 @@ def occupancy(points: Array, edge: float | None = None, flat: float = 0.0) -> Gr
     wanted = [float(span / edge) for span in spans]
     if np.prod(np.ceil(wanted)) > _MOST_CELLS:
         least = float(np.prod(spans) / _MOST_CELLS) ** (1 / len(spans))
-        raise ValueError(f"edge {edge:g} m makes more than {_MOST_CELLS} cells; expected about {least:.2g} m or more")
+        raise ValueError(
+            f"edge {edge:g} m makes more than {_MOST_CELLS} cells; expected about {least:.2g} m or more"
+        )
     # A span that is a whole number of edges but for rounding does not get another cell.
     shape = tuple(max(1, int(np.ceil(cells * (1 - 1e-12)))) for cells in wanted)
     # The box's middle is the grid's, so that no border cell is a sliver by rounding.
@@ -323,7 +343,9 @@ def _ranges(description: Description) -> tuple[Array, Array, tuple[str, ...]]:
         upper[i] = room
         if numbers.prismatic[i]:
             name = description.joints[i].name
-            assumed.append(f"joint {i + 1} {name} has no limits: it was moved {room:.4g} m to both sides")
+            assumed.append(
+                f"joint {i + 1} {name} has no limits: it was moved {room:.4g} m to both sides"
+            )
     return lower, upper, tuple(assumed)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -132,7 +132,8 @@ class OwnScore(Condition):
         parts = functions.get(self.function, ()) if isinstance(functions, Mapping) else ()
         max_points = sum(part["most"] for part in parts)
         return bool(
-            max_points > 0 and sum(part["points"] for part in parts) >= (self.share - GOAL_TOLERANCE) * max_points
+            max_points > 0
+            and sum(part["points"] for part in parts) >= (self.share - GOAL_TOLERANCE) * max_points
         )
 
 
@@ -195,7 +196,9 @@ class ControlWithin(Condition):
 
     def is_kept(self, settings: Settings, errors: Array) -> bool:
         """Return whether a run with these settings is asked for, and its errors, shape (k,), rad and m, are small."""
-        is_asked_for = settings.reference.value == self.reference and settings.payload >= self.payload
+        is_asked_for = (
+            settings.reference.value == self.reference and settings.payload >= self.payload
+        )
         has_controller = self.controller in (None, settings.controller)
         return bool(is_asked_for and has_controller and np.abs(errors).max() <= self.error)
 
@@ -245,6 +248,13 @@ class Step:
         return repr_line(f"Step {plain(self.title, 80)}", summary=counted(len(self.goals), "goal"))
 
 
+class Place(NamedTuple):
+    """The place of a goal in an assignment, counted from 0."""
+
+    step: int
+    goal: int
+
+
 @dataclass(frozen=True, eq=False)
 class Assignment:
     """A robot, the joint values where it begins, and steps with goals.
@@ -291,6 +301,14 @@ class Assignment:
     digest: str = ""
 
     @property
+    def places(self) -> tuple[Place, ...]:
+        """The places of all goals, in their order."""
+        places = []
+        for i, step in enumerate(self.steps):
+            places += [Place(i, j) for j in range(len(step.goals))]
+        return tuple(places)
+
+    @property
     def points(self) -> float:
         """The points of all goals together."""
         goals = chain.from_iterable(step.goals for step in self.steps)
@@ -317,7 +335,9 @@ class Assignment:
             for k, step in enumerate(form.step, start=1):
                 place = f"step {k}: "
                 if form.panels is not None and step.panel not in (None, *form.panels):
-                    raise DescriptionError(f"{place}panel: found {step.panel!r}; expected one that panels lists")
+                    raise DescriptionError(
+                        f"{place}panel: found {step.panel!r}; expected one that panels lists"
+                    )
                 goals = tuple(
                     Goal(goal.text, goal.points, _condition(arm, goal, f"{place}goal {i}: "))
                     for i, goal in enumerate(step.goal, start=1)
@@ -337,17 +357,24 @@ class Assignment:
             The robot is another one.
         """
         if arm.description.digest != self.arm.description.digest:
-            raise DescriptionError(f"found {arm.name}; expected {self.arm.name} as the assignment has it")
+            raise DescriptionError(
+                f"found {arm.name}; expected {self.arm.name} as the assignment has it"
+            )
 
     def __repr__(self) -> str:
-        content = f"{counted(len(self.steps), 'step')}, {counted(self.points, 'point')}, {self.arm.name}"
+        content = (
+            f"{counted(len(self.steps), 'step')}, {counted(self.points, 'point')}, {self.arm.name}"
+        )
         return repr_line(f"Assignment {plain(self.title, 60)}", summary=content)
 
     def _repr_html_(self) -> str:
         rows = []
         for step in self.steps:
             rows += [(step.title, f"{goal.points:g}", goal.text) for goal in step.goals]
-        return html_block(f"{self.title}: {self.arm.name}", html_table(("step", "points", "goal"), rows, align="lrl"))
+        return html_block(
+            f"{self.title}: {self.arm.name}",
+            html_table(("step", "points", "goal"), rows, align="lrl"),
+        )
 
 
 def is_assignment(path: str | Path) -> bool:
@@ -365,15 +392,23 @@ def is_assignment(path: str | Path) -> bool:
     except (DhkitError, UnicodeDecodeError):
         return False
     kind = document.get("kind")
-    if isinstance(kind, str) and kind != "assignment" and difflib.get_close_matches(kind, ["assignment"]):
-        raise DescriptionError(f"{path}: kind is {kind[:40]!r}; expected 'assignment', or no kind for a robot file")
+    if (
+        isinstance(kind, str)
+        and kind != "assignment"
+        and difflib.get_close_matches(kind, ["assignment"])
+    ):
+        raise DescriptionError(
+            f"{path}: kind is {kind[:40]!r}; expected 'assignment', or no kind for a robot file"
+        )
     return kind == "assignment"
 
 
 def _arm_of(name: str, folder: Path) -> Arm:
     """Return a robot of the library, or of a file in an assignment's own folder."""
     try:
-        return Arm(read_robot(_robot_path(name, folder)) if name.endswith(".toml") else library_robot(name))
+        return Arm(
+            read_robot(_robot_path(name, folder)) if name.endswith(".toml") else library_robot(name)
+        )
     except DescriptionError as error:
         raise DescriptionError(f"robot: {error}") from None
 
@@ -400,7 +435,9 @@ def _condition(arm: Arm, form: GoalForm, place: str) -> Condition:
         begin = _joint_values(arm, form.motion.begin, f"{place}motion.from: ")
         end = _joint_values(arm, form.motion.end, f"{place}motion.to: ")
         if np.abs(begin - end).max() <= tolerance.joint:
-            raise DescriptionError(f"{place}motion: it ends where it begins; expected two configurations")
+            raise DescriptionError(
+                f"{place}motion: it ends where it begins; expected two configurations"
+            )
         max_duration = np.inf if form.motion.duration is None else form.motion.duration
         return MotionBetween(begin, end, tolerance.joint, max_duration)
     if form.answer is not None:
@@ -409,7 +446,9 @@ def _condition(arm: Arm, form: GoalForm, place: str) -> Condition:
         return NumberIs(form.number.value, form.number.tolerance)
     if form.control is not None:
         control = form.control
-        return ControlWithin(control.error, control.seconds, control.reference, control.payload, control.controller)
+        return ControlWithin(
+            control.error, control.seconds, control.reference, control.payload, control.controller
+        )
     own = form.own
     assert own is not None  # noqa: S101 - for mypy: the form has exactly one
     return OwnScore(own.function, own.share)
@@ -421,14 +460,20 @@ def _joint_values(arm: Arm, given: str | tuple[float, ...], place: str) -> Array
         configurations = {"zero": np.zeros(arm.n), **arm.configurations}
         if given not in configurations:
             found = f"{arm.name} has no configuration {given[:40]!r}"
-            raise DescriptionError(f"{place}{found}; expected {', '.join(configurations)}, or a list of joint values")
+            raise DescriptionError(
+                f"{place}{found}; expected {', '.join(configurations)}, or a list of joint values"
+            )
         q = np.array(configurations[given])
     elif len(given) != arm.n:
-        raise DescriptionError(f"{place}found {len(given)} joint values; expected {arm.n} for {arm.name}")
+        raise DescriptionError(
+            f"{place}found {len(given)} joint values; expected {arm.n} for {arm.name}"
+        )
     else:
         q = np.array(given)
     numbers = arm.description.numbers
-    for i in np.flatnonzero((q < numbers.lower - GOAL_TOLERANCE) | (q > numbers.upper + GOAL_TOLERANCE)):
+    for i in np.flatnonzero(
+        (q < numbers.lower - GOAL_TOLERANCE) | (q > numbers.upper + GOAL_TOLERANCE)
+    ):
         joint = arm.description.joints[i].name
         limits = f"{numbers.lower[i]:.4g} to {numbers.upper[i]:.4g}"
         raise DescriptionError(f"{place}{joint} is {q[i]:.4g}; expected {limits}, its limits")
@@ -447,10 +492,18 @@ def _tool_at(arm: Arm, form: PoseForm, tolerance: ToleranceForm, place: str) -> 
     fit = classify(arm.description).fit
     # With a rotation, the closed form of six joints decides whether the pose is reached; without one, the closed form
     # of an arm whose solutions meet the position alone.
-    if fit is not None and ((form.euler is not None and arm.n >= 6) or set(fit.coordinates) <= {"x", "y", "z"}):
+    if fit is not None and (
+        (form.euler is not None and arm.n >= 6) or set(fit.coordinates) <= {"x", "y", "z"}
+    ):
         solutions = arm.ik(T)
-        is_near = 0 < float(solutions.distance) <= tolerance.position  # beyond the workspace by less than the tolerance
+        is_near = (
+            0 < float(solutions.distance) <= tolerance.position
+        )  # beyond the workspace by less than the tolerance
         if not is_near and not bool(np.any(solutions.valid & solutions.allowed)):
-            problem = "in reach only outside the joint limits" if np.any(solutions.valid) else "out of reach"
+            problem = (
+                "in reach only outside the joint limits"
+                if np.any(solutions.valid)
+                else "out of reach"
+            )
             raise DescriptionError(f"{place}{problem}; expected a pose that the arm can take")
     return ToolAt(T, form.euler is not None, tolerance.position, tolerance.angle)

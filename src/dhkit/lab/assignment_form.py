@@ -22,7 +22,14 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from dhkit.control import CONTROLLERS
-from dhkit.description.schema import JsonSchema, KeyPath, key_text, length_bound, shortened, titled_schema
+from dhkit.description.schema import (
+    JsonSchema,
+    KeyPath,
+    key_text,
+    length_bound,
+    shortened,
+    titled_schema,
+)
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 from dhkit.lab.run_settings import OWN
@@ -40,7 +47,18 @@ MAX_EXPRESSION_LENGTH = 200
 """Longest number that is written as an expression, characters."""
 MAX_NUMBER = 1e4
 """Largest number, rad or m."""
-PANELS = ("joints", "tool", "motion", "table", "dynamics", "workspace", "control", "transforms", "submit", "own")
+PANELS = (
+    "joints",
+    "tool",
+    "motion",
+    "table",
+    "dynamics",
+    "workspace",
+    "control",
+    "transforms",
+    "submit",
+    "own",
+)
 """Names of the lab's panels that an assignment may show, in the order in which the page lists them."""
 DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that change the direction of the text after them, and so the text that a reader sees."""
@@ -50,12 +68,16 @@ def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise PydanticCustomError("expected", "a number, or an expression in quotes")
     if isinstance(value, str) and len(value) > MAX_EXPRESSION_LENGTH:
-        raise PydanticCustomError("expected", f"an expression of at most {MAX_EXPRESSION_LENGTH} characters")
+        raise PydanticCustomError(
+            "expected", f"an expression of at most {MAX_EXPRESSION_LENGTH} characters"
+        )
     try:
         number = float(parse(value)) if isinstance(value, str) else float(value)
     except ExpressionError as error:
         reason = " ".join(str(error).split())[:150]
-        raise PydanticCustomError("expected", "an expression such as pi/2 ({reason})", {"reason": reason}) from None
+        raise PydanticCustomError(
+            "expected", "an expression such as pi/2 ({reason})", {"reason": reason}
+        ) from None
     except OverflowError:
         number = float("inf")
     if not abs(number) <= MAX_NUMBER:
@@ -73,8 +95,12 @@ def _joint_values(value: object) -> str | tuple[float, ...]:
 
 def _readable(text: str) -> str:
     for letter in text:
-        if letter in DIRECTION_CONTROLS or (unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t"):
-            raise PydanticCustomError("text", f"found the control character U+{ord(letter):04X}; expected plain text")
+        if letter in DIRECTION_CONTROLS or (
+            unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t"
+        ):
+            raise PydanticCustomError(
+                "text", f"found the control character U+{ord(letter):04X}; expected plain text"
+            )
     if not text.strip():
         raise PydanticCustomError("text", "found an empty text; expected words")
     return text
@@ -114,12 +140,20 @@ JointValues: TypeAlias = Annotated[
     PlainValidator(_joint_values),
     WithJsonSchema({"anyOf": [NAME, {"type": "array", "items": NUMBER, "maxItems": MAX_JOINTS}]}),
 ]
-Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), AfterValidator(_readable), AfterValidator(_in_one_line)]
+Line = Annotated[
+    str, Field(max_length=MAX_LINE_LENGTH), AfterValidator(_readable), AfterValidator(_in_one_line)
+]
 Text = Annotated[str, Field(max_length=MAX_TEXT_LENGTH), AfterValidator(_readable)]
-Panel = Annotated[str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=list(PANELS)))]
-Order = Annotated[str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*EULER_ORDERS]))]
+Panel = Annotated[
+    str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=list(PANELS)))
+]
+Order = Annotated[
+    str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*EULER_ORDERS]))
+]
 ControllerName = Annotated[
-    str, AfterValidator(_controller), Field(json_schema_extra=lambda s: s.update(enum=[*CONTROLLERS, OWN]))
+    str,
+    AfterValidator(_controller),
+    Field(json_schema_extra=lambda s: s.update(enum=[*CONTROLLERS, OWN])),
 ]
 Points = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
 Within = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
@@ -192,7 +226,9 @@ class ControlForm:
 
 @dataclass(
     frozen=True,
-    config=ConfigDict(extra="forbid", json_schema_extra={"oneOf": [{"required": [name]} for name in CONDITIONS]}),
+    config=ConfigDict(
+        extra="forbid", json_schema_extra={"oneOf": [{"required": [name]} for name in CONDITIONS]}
+    ),
 )
 class GoalForm:
     """Goal of a step: one of pose, joints, motion, own, answer, number and control."""
@@ -213,7 +249,8 @@ class GoalForm:
         given = [name for name in CONDITIONS if getattr(self, name) is not None]
         if len(given) != 1:
             raise PydanticCustomError(
-                "text", f"found {' and '.join(given) or 'none'}; expected exactly one of {', '.join(CONDITIONS)}"
+                "text",
+                f"found {' and '.join(given) or 'none'}; expected exactly one of {', '.join(CONDITIONS)}",
             )
         return self
 
@@ -272,7 +309,9 @@ def validated(document: Mapping[str, object]) -> AssignmentForm:
         return TypeAdapter(AssignmentForm).validate_python(dict(document))
     except ValidationError as error:
         # A mistyped key is also a missing one: the unknown key is the more useful message.
-        faults = sorted(error.errors(), key=lambda fault: fault["type"] != "unexpected_keyword_argument")
+        faults = sorted(
+            error.errors(), key=lambda fault: fault["type"] != "unexpected_keyword_argument"
+        )
         raise DescriptionError(_fault_text(faults[0])) from None
 
 

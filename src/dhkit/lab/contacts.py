@@ -78,12 +78,17 @@ def nearest(arm: Arm, q: Array, scene: Scene = ()) -> NearestState | None:
     if beside is not None and (links is None or beside.distance < links.distance):
         points = beside.points.tolist()
         return NearestState(
-            links=[beside.link.link], obstacle=beside.obstacle.name, distance=beside.distance, points=points
+            links=[beside.link.link],
+            obstacle=beside.obstacle.name,
+            distance=beside.distance,
+            points=points,
         )
     if links is None:
         return None
     numbers = [links.first.link, links.second.link]
-    return NearestState(links=numbers, obstacle=None, distance=links.distance, points=links.points.tolist())
+    return NearestState(
+        links=numbers, obstacle=None, distance=links.distance, points=links.points.tolist()
+    )
 
 
 def _by_capsules(arm: Arm, q: Array) -> NearestState | None:
@@ -93,10 +98,15 @@ def _by_capsules(arm: Arm, q: Array) -> NearestState | None:
         return None
     if bodies is None:
         return None
-    return NearestState(links=[body.link for body in bodies], obstacle=None, distance=None, points=None)
+    return NearestState(
+        links=[body.link for body in bodies], obstacle=None, distance=None, points=None
+    )
 
 
 def contacts_along(arm: Arm, q: Array, scene: Scene = ()) -> list[NearestState | None]:
     """Return :func:`nearest` where something touches or may touch, else None, at joint values (N, n), rad and m."""
     found = (nearest(arm, state, scene) for state in q)
-    return [one if one is not None and (one["distance"] is None or one["distance"] < 0) else None for one in found]
+    return [
+        one if one is not None and (one["distance"] is None or one["distance"] < 0) else None
+        for one in found
+    ]

@@ -94,7 +94,9 @@ class ControlPanel(Panel):
         settings = self.settings.changed(fields)
         arm = self.desk.arm
         if not has_bodies(arm):
-            raise ValueError("control.start: the arm has no bodies; expected uniform links to be assumed first")
+            raise ValueError(
+                "control.start: the arm has no bodies; expected uniform links to be assumed first"
+            )
         self._require_reference(settings.reference)
         self._end_run()
         with self._lock:
@@ -104,7 +106,13 @@ class ControlPanel(Panel):
             self._start_q = self.desk.q.copy()
             try:
                 friction = settings.friction_model
-                live = Live(self._free_arm(arm), self._plant(arm), friction, self._start_q[self.free], CONTROL_RATE)
+                live = Live(
+                    self._free_arm(arm),
+                    self._plant(arm),
+                    friction,
+                    self._start_q[self.free],
+                    CONTROL_RATE,
+                )
                 live.take(self._controller(live))
                 live.setpoints = self._setpoints(live, arm)
             except (DhkitError, ValueError):
@@ -116,7 +124,9 @@ class ControlPanel(Panel):
             self._paused = False
             self._speed = 1.0
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(live, self._stop), name="dhkit-control", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(live, self._stop), name="dhkit-control", daemon=True
+        )
         self.desk.running = True
         self._thread.start()
         self.publish()
@@ -134,9 +144,15 @@ class ControlPanel(Panel):
                         self._require_reference(settings.reference)
                     self.settings = settings
                     controller = None
-                    if any(getattr(settings, name) != getattr(previous, name) for name in CONTROLLER_SETTINGS):
+                    if any(
+                        getattr(settings, name) != getattr(previous, name)
+                        for name in CONTROLLER_SETTINGS
+                    ):
                         controller = self._controller(live)
-                    if (settings.payload, settings.friction) != (previous.payload, previous.friction):
+                    if (settings.payload, settings.friction) != (
+                        previous.payload,
+                        previous.friction,
+                    ):
                         live.change(self._plant(self.desk.arm), settings.friction_model)
                 except (DhkitError, ValueError):
                     self.settings = previous
@@ -156,7 +172,9 @@ class ControlPanel(Panel):
         if min(map(min, gains)) < 0:
             raise ValueError("control.gains: a gain is negative; expected numbers from 0 on")
         if self.settings.controller not in JOINT_CONTROLLERS:
-            raise ValueError(f"control.gains: the controller is {self.settings.controller}; expected PID or PD")
+            raise ValueError(
+                f"control.gains: the controller is {self.settings.controller}; expected PID or PD"
+            )
         with self._lock:
             self.settings = replace(self.settings, gains=gains)
             if self._live is not None and self.desk.running:
@@ -189,7 +207,9 @@ class ControlPanel(Panel):
             if self._live is None or not self.desk.running:
                 raise ValueError("control.push: nothing runs")
             if self.planar and link is not None:
-                raise ValueError("control.push: only the tool can be pushed while joints are locked")
+                raise ValueError(
+                    "control.push: only the tool can be pushed while joints are locked"
+                )
             self._live.push(link, force, duration)
 
     @answers("control.download", "format")
@@ -217,7 +237,9 @@ class ControlPanel(Panel):
         on = fields.flag("on")
         kinds = self.desk.arm.description.kinds
         if on and (self.desk.arm.n < 4 or kinds[1:3] != "RR"):
-            raise ValueError(f"arm.planar: joints are {kinds}; expected at least 4, the second and third revolute")
+            raise ValueError(
+                f"arm.planar: joints are {kinds}; expected at least 4, the second and third revolute"
+            )
         self._end_run()
         self.planar = on
         self.publish()
@@ -231,14 +253,18 @@ class ControlPanel(Panel):
             {
                 "running": self._thread is not None,
                 "paused": self._paused,
-                "controllers": [{"name": name, "title": CONTROLLER_TITLES.get(name, name)} for name in names],
+                "controllers": [
+                    {"name": name, "title": CONTROLLER_TITLES.get(name, name)} for name in names
+                ],
                 **vars(self.settings),
                 "planar": self.planar,
                 "rate": CONTROL_RATE,
                 "speed": round(self._speed, 2),
                 "time": round(live.t, 3) if live is not None else 0.0,
                 "error": self._error,
-                "note": "the links' masses are assumed: uniform rods" if self.desk.assumed_bodies else None,
+                "note": "the links' masses are assumed: uniform rods"
+                if self.desk.assumed_bodies
+                else None,
                 "gains": self._gains_state(),
             },
         )
@@ -249,21 +275,30 @@ class ControlPanel(Panel):
         if self.settings.controller not in JOINT_CONTROLLERS or not has_bodies(arm):
             return None
         settings = self.settings
-        m, tuned = _tuned(arm.description, settings.controller, settings.bandwidth, settings.damping)
+        m, tuned = _tuned(
+            arm.description, settings.controller, settings.bandwidth, settings.damping
+        )
         gains = tuned if settings.gains is None else settings.gains
         # m s^3 + kd s^2 + kp s + ki = 0 of each joint alone, with its effective inertia m
-        poles = [np.roots(row) for row in np.stack([m, gains.kd, gains.kp, gains.ki], axis=1)]
-        slowest = [max(pole.real for pole in row if abs(pole) > STILL_POLE) for row in poles]
+        slowest = []
+        for polynomial in np.stack([m, gains.kd, gains.kp, gains.ki], axis=1):
+            poles = np.roots(polynomial)
+            moving = poles[np.abs(poles) > STILL_POLE]
+            slowest.append(float(moving.real.max()))
         return {
             **gains._asdict(),
-            "slowest": [float(pole) for pole in slowest],
+            "slowest": slowest,
             "tuned": settings.gains is None,
         }
 
     @property
     def locked(self) -> dict[int, float]:
         """The values of the joints that a run does not move, by joint from 0."""
-        return {i: float(x) for i, x in enumerate(self._start_q) if i not in self.free} if self.planar else {}
+        return (
+            {i: float(x) for i, x in enumerate(self._start_q) if i not in self.free}
+            if self.planar
+            else {}
+        )
 
     @property
     def setpoint(self) -> Array:
@@ -284,7 +319,9 @@ class ControlPanel(Panel):
         shown = 0
         ratio = CONTROL_RATE / FRAME_RATE
         columns = self._columns()
-        self.desk.view.append(Samples("control", columns, np.zeros((0, len(columns)), np.float32), restart=True))
+        self.desk.view.append(
+            Samples("control", columns, np.zeros((0, len(columns)), np.float32), restart=True)
+        )
         try:
             while not stop.is_set():
                 if self._paused:
@@ -333,8 +370,10 @@ class ControlPanel(Panel):
 
     def _columns(self) -> tuple[str, ...]:
         """Return the names of the numbers of a sample: time, then values, errors and torques of the free joints."""
-        names = [f"{quantity}{i + 1}" for quantity in ("q", "e", "tau") for i in self.free]
-        return ("t", *names, "tool")
+        names = ["t"]
+        for quantity in ("q", "e", "tau"):
+            names += [f"{quantity}{i + 1}" for i in self.free]
+        return (*names, "tool")
 
     def _report_failure(self, live: Live, stop: threading.Event, error: str) -> None:
         """Publish why a run failed, unless the run was stopped or replaced in the meantime."""
@@ -369,7 +408,11 @@ class ControlPanel(Panel):
         """Follow the new motion from now on; hold the setpoint where the motion was taken away."""
         with self._lock:
             live = self._live
-            if live is None or not self.desk.running or self.settings.reference is not ReferenceKind.MOTION:
+            if (
+                live is None
+                or not self.desk.running
+                or self.settings.reference is not ReferenceKind.MOTION
+            ):
                 return
             if self.motions.motion is None:
                 self.settings = replace(self.settings, reference=ReferenceKind.HOLD)
@@ -400,7 +443,9 @@ class ControlPanel(Panel):
             kp, ki, kd = (np.array(gain)[self.free] for gain in settings.gains)
             controller = PID(kp, ki, kd, limit=description.numbers.effort)
         else:
-            controller = make_controller(settings.controller, description, settings.bandwidth, settings.damping, live.q)
+            controller = make_controller(
+                settings.controller, description, settings.bandwidth, settings.damping, live.q
+            )
         return FrictionCompensation(controller, live.arm) if settings.compensate else controller
 
     def _require_reference(self, reference: ReferenceKind) -> None:
@@ -412,9 +457,13 @@ class ControlPanel(Panel):
             Names the missing part.
         """
         if reference is ReferenceKind.MOTION and self.motions.motion is None:
-            raise ValueError("control: there is no motion to follow; expected one planned first (Motion)")
+            raise ValueError(
+                "control: there is no motion to follow; expected one planned first (Motion)"
+            )
         if reference is ReferenceKind.TARGET and self.desk.target_q is None:
-            raise ValueError("control: there is no target to follow; expected one that is in reach (Tool)")
+            raise ValueError(
+                "control: there is no target to follow; expected one that is in reach (Tool)"
+            )
 
     def _setpoints(self, live: Live, arm: Arm) -> Setpoints:
         """Return the setpoints of the free joints that the run follows from now on."""
@@ -462,9 +511,14 @@ class ControlPanel(Panel):
 
 
 @lru_cache(maxsize=4)
-def _tuned(description: Description, name: str, bandwidth: float, damping: float) -> tuple[Array, Gains]:
+def _tuned(
+    description: Description, name: str, bandwidth: float, damping: float
+) -> tuple[Array, Gains]:
     """Return the effective inertias of the joints, shape (n,), and the gains that a joint controller is tuned to."""
     controller = make_controller(name, description, bandwidth, damping)
     assert isinstance(controller, PID)  # noqa: S101 - for mypy: JOINT_CONTROLLERS are PIDs
-    gains = (np.broadcast_to(gain, description.n) for gain in (controller.kp, controller.ki, controller.kd))
+    gains = (
+        np.broadcast_to(gain, description.n)
+        for gain in (controller.kp, controller.ki, controller.kd)
+    )
     return effective_inertia(description), Gains(*(tuple(gain.tolist()) for gain in gains))

@@ -166,7 +166,10 @@ class Desk:
         numbers = arm.description.numbers
         outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper)).tolist()
         nearest = self._contacts.nearest(arm, q, self.scene)
-        self.view.panel("joints", {"q": q.tolist(), "within": not outside, "outside": outside, "nearest": nearest})
+        self.view.panel(
+            "joints",
+            {"q": q.tolist(), "within": not outside, "outside": outside, "nearest": nearest},
+        )
         self.view.panel("tool", self.tool_state(arm, q))
 
     def tool_state(self, arm: Arm, q: Array) -> dict[str, object]:
@@ -182,7 +185,9 @@ class Desk:
             "order": self.order,
             "unique": bool(abs(uniqueness) > EULER_TOLERANCE),
             "manipulability": float(arm.manipulability(q)),
-            "singular": "singular: the tool cannot move in one of its directions here" if is_singular(arm, q) else None,
+            "singular": "singular: the tool cannot move in one of its directions here"
+            if is_singular(arm, q)
+            else None,
         }
 
     def close(self) -> None:

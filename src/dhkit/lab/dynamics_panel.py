@@ -70,11 +70,17 @@ class DynamicsPanel(Panel):
         arm = self.desk.arm
         view = self.desk.view
         if not ENTRY.fullmatch(name) or any(int(digit) > arm.n for digit in name[1:]):
-            raise ValueError(f"dynamics.entry: name is {name!r}; expected M11 to M{arm.n}{arm.n}, or g1 to g{arm.n}")
+            raise ValueError(
+                f"dynamics.entry: name is {name!r}; expected M11 to M{arm.n}{arm.n}, or g1 to g{arm.n}"
+            )
         if not has_bodies(arm):
-            raise ValueError("dynamics.entry: the arm has no masses; expected uniform links to be assumed (Control)")
+            raise ValueError(
+                "dynamics.entry: the arm has no masses; expected uniform links to be assumed (Control)"
+            )
         view.panel("entry", {"name": name, "deriving": True})
-        self.jobs.start(name, lambda job: _formula(arm, name, job), lambda formula: view.panel("entry", formula))
+        self.jobs.start(
+            name, lambda job: _formula(arm, name, job), lambda formula: view.panel("entry", formula)
+        )
 
     def publish(self) -> None:
         """Tell the pages whether the ellipsoid is drawn."""
@@ -86,7 +92,9 @@ class DynamicsPanel(Panel):
 
     def _publish_failure(self, state: JobState | None) -> None:
         if state is not None and state["error"]:
-            self.desk.view.panel("entry", {"name": state["title"], "deriving": False, "error": state["error"]})
+            self.desk.view.panel(
+                "entry", {"name": state["title"], "deriving": False, "error": state["error"]}
+            )
 
     def _forget(self) -> None:
         self.jobs.cancel()
@@ -108,5 +116,7 @@ def _formula(arm: Arm, name: str, job: Job) -> JsonObject:
         "deriving": False,
         "lines": formulas if fits else [],
         "terms": terms,
-        "error": None if fits else f"{name} has {terms} terms: dhkit equations writes them to a file",
+        "error": None
+        if fits
+        else f"{name} has {terms} terms: dhkit equations writes them to a file",
     }

@@ -94,7 +94,9 @@ class Jobs:
         self._waiting: Callable[[], None] | None = None
         self._thread: threading.Thread | None = None
 
-    def start(self, title: str, work: Callable[[Job], Result], take: Callable[[Result], None]) -> int:
+    def start(
+        self, title: str, work: Callable[[Job], Result], take: Callable[[Result], None]
+    ) -> int:
         """Start a job instead of the one that runs, and return its number; ``take`` is called with its result."""
         self.cancel()
         self._count += 1
@@ -103,7 +105,9 @@ class Jobs:
         with self._lock:
             self._waiting = lambda: self._run(job, work, take)
             if self._thread is None:
-                self._thread = threading.Thread(target=self._run_waiting, name="dhkit-job", daemon=True)
+                self._thread = threading.Thread(
+                    target=self._run_waiting, name="dhkit-job", daemon=True
+                )
                 self._thread.start()
         return job.number
 
@@ -160,4 +164,10 @@ class Jobs:
 
 
 def _state(job: Job, error: str | None) -> JobState:
-    return {"id": job.number, "title": job.title, "progress": job.text, "running": error is None, "error": error}
+    return {
+        "id": job.number,
+        "title": job.title,
+        "progress": job.text,
+        "running": error is None,
+        "error": error,
+    }

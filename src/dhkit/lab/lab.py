@@ -116,7 +116,9 @@ class Lab:
             WorkspacePanel(desk, self._lock),
             submitted,
             TransformsPanel(desk, solid_read),
-            TaskPanel(desk, self._motions, self._own, submitted, self._control, assignment, record, work),
+            TaskPanel(
+                desk, self._motions, self._own, submitted, self._control, assignment, record, work
+            ),
             PythonPanel(desk, table, self._tool, self._motions, self._control, loaded_from),
             self._own,
         )

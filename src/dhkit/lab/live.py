@@ -50,7 +50,9 @@ class Live:
         Calls of the controller per second, Hz.
     """
 
-    def __init__(self, arm: Arm, plant: Arm, friction: Friction | None, q: Array, rate: float) -> None:
+    def __init__(
+        self, arm: Arm, plant: Arm, friction: Friction | None, q: Array, rate: float
+    ) -> None:
         self.arm = arm
         self.rate = rate
         self.controller: Controller | None = None
@@ -90,7 +92,9 @@ class Live:
         """
         self._plant = Plant(plant.description, friction, 0.0, self._pushes)
         state = self._state
-        self._begin_record(State(state.t, state.q, state.qd, state.memory))  # the new record has done no work yet
+        self._begin_record(
+            State(state.t, state.q, state.qd, state.memory)
+        )  # the new record has done no work yet
 
     def push(self, link: int | None, force: Array, duration: float) -> None:
         """Push from now on for a duration, s.
@@ -133,13 +137,17 @@ class Live:
         n = self.arm.n
         assert self.controller is not None  # noqa: S101 - for mypy: a controller was taken before
         setpoint = Setpoint(self.arm.description, *self.setpoints(state.t))
-        returned = call_controller(self.controller, state.t, state.q.copy(), state.qd.copy(), setpoint)
+        returned = call_controller(
+            self.controller, state.t, state.q.copy(), state.qd.copy(), setpoint
+        )
         commanded = torques(returned, n, state.t)
         self._require_stable(commanded, state.t)
         effort = plant.description.numbers.effort
         tau = np.clip(commanded, -effort, effort)
         phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
-        self._record((state.t, *state.q, *state.qd, *phase.qdd, *tau, *commanded, *setpoint.q, *setpoint.qd))
+        self._record(
+            (state.t, *state.q, *state.qd, *phase.qdd, *tau, *commanded, *setpoint.q, *setpoint.qd)
+        )
         begin = state.t
         end = state.t + 1 / self.rate
         edges = {push.begin for push in self._pushes} | {push.end for push in self._pushes}
@@ -179,9 +187,17 @@ class Live:
             raise ValueError("nothing has been simulated yet")
         rows = self._rows[: self._count]
         recorded = {"t": rows[:, 0] - rows[0, 0]}
-        recorded |= zip(COLUMNS, (x.copy() for x in np.split(rows[:, 1:], len(COLUMNS), axis=1)), strict=True)
+        recorded |= zip(
+            COLUMNS, (x.copy() for x in np.split(rows[:, 1:], len(COLUMNS), axis=1)), strict=True
+        )
         return result_of(
-            self.arm.description, self._plant, recorded, self._start, self._state, self._turnover, self.controller
+            self.arm.description,
+            self._plant,
+            recorded,
+            self._start,
+            self._state,
+            self._turnover,
+            self.controller,
         )
 
     def _begin_record(self, state: State) -> None:

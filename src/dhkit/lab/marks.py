@@ -12,8 +12,8 @@ from pathlib import Path
 from dhkit.display import plain, value_line
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.grading.reports.marks_csv import cell
-from dhkit.lab.assignment import Assignment, Goal
-from dhkit.lab.record import SUFFIX, Place, Reached, Record, is_confirmed
+from dhkit.lab.assignment import Assignment, Goal, Place
+from dhkit.lab.record import SUFFIX, Reached, Record, is_confirmed
 
 MAX_CELL = 1_000
 """Longest text of a cell, characters."""
@@ -75,7 +75,9 @@ def find_records(paths: Sequence[Path]) -> list[Path]:
             inside = [path]
         found |= dict.fromkeys(inside)
     if not found:
-        raise AnswerError(f"{', '.join(map(str, paths))}: no record of a lab; expected files *{SUFFIX}")
+        raise AnswerError(
+            f"{', '.join(map(str, paths))}: no record of a lab; expected files *{SUFFIX}"
+        )
     return list(found)
 
 
@@ -84,7 +86,9 @@ def lab_mark(path: Path, assignment: Assignment) -> LabMark:
     try:
         record = Record.read(path)
     except AnswerError as error:
-        return LabMark(path, "", 0.0, assignment.points, notes=(str(error).removeprefix(f"{path}: "),))
+        return LabMark(
+            path, "", 0.0, assignment.points, notes=(str(error).removeprefix(f"{path}: "),)
+        )
     if record.digest != assignment.digest:
         note = "the record is about another assignment, or another version of this one"
         return LabMark(path, record.student, 0.0, assignment.points, notes=(note,))
@@ -107,7 +111,15 @@ def lab_mark(path: Path, assignment: Assignment) -> LabMark:
                 times.append(reached.time)
     last = max(times, default="")
     return LabMark(
-        path, record.student, sum(points), assignment.points, tuple(points), last, record.begun, unchecked, tuple(notes)
+        path,
+        record.student,
+        sum(points),
+        assignment.points,
+        tuple(points),
+        last,
+        record.begun,
+        unchecked,
+        tuple(notes),
     )
 
 
@@ -144,10 +156,21 @@ def lab_marks_csv(marks: Sequence[LabMark], assignment: Assignment) -> str:
     """Return marks as CSV text: a row for each record, a column for each goal."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    goals = [f"{i + 1}.{j + 1}" for i, step in enumerate(assignment.steps) for j in range(len(step.goals))]
-    writer.writerow(["student", "points", "of", *goals, "last goal", "not checked again", "notes", "file"])
+    goals = [f"{place.step + 1}.{place.goal + 1}" for place in assignment.places]
+    writer.writerow(
+        ["student", "points", "of", *goals, "last goal", "not checked again", "notes", "file"]
+    )
     for mark in marks:
         each = [f"{x:g}" for x in mark.goals] or [""] * len(goals)
-        row = [mark.student, f"{mark.points:g}", f"{mark.most:g}", *each, mark.last, str(mark.unchecked)]
-        writer.writerow([cell(plain(text, MAX_CELL)) for text in (*row, "; ".join(mark.notes), str(mark.file))])
+        row = [
+            mark.student,
+            f"{mark.points:g}",
+            f"{mark.most:g}",
+            *each,
+            mark.last,
+            str(mark.unchecked),
+        ]
+        writer.writerow(
+            [cell(plain(text, MAX_CELL)) for text in (*row, "; ".join(mark.notes), str(mark.file))]
+        )
     return file.getvalue()

@@ -108,7 +108,10 @@ class MotionPanel(Panel):
             T = goal.pose("T") if "T" in goal else arm.fk(goal.joint_values("q", arm.n))
             call = f"arm.straight_line(arm.fk({literal(start)}), {literal(T)}, {literal(start)}, {duration!r})"
             return self._start_job(
-                kind, lambda job: PlannedMotion(arm.straight_line(arm.fk(start), T, start, duration), call)
+                kind,
+                lambda job: PlannedMotion(
+                    arm.straight_line(arm.fk(start), T, start, duration), call
+                ),
             )
         if "T" in goal:
             end: Array = solve_pose(arm, goal.pose("T"), start)[0].require(start)
@@ -154,17 +157,23 @@ class MotionPanel(Panel):
         suffix, content = _file_of(fields, SUFFIXES)
         degrees = fields.flag("degrees", False)
         columns = fields.data.get("columns")
-        if columns is not None and not (isinstance(columns, dict) and all(map(_is_text, columns.values()))):
+        if columns is not None and not (
+            isinstance(columns, dict) and all(map(_is_text, columns.values()))
+        ):
             raise ValueError("motion.file: columns is not an object of texts")
         with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
             path = Path(folder) / f"file{suffix}"
             path.write_bytes(content)
             try:
-                motion = read_motion(path, self.desk.arm.description, degrees=degrees, columns=columns)
+                motion = read_motion(
+                    path, self.desk.arm.description, degrees=degrees, columns=columns
+                )
             except DescriptionError as error:
                 raise ValueError(str(error).replace(str(path), fields.text("name"))) from None
         name = f"{self.desk.arm.name}-motion.npz"
-        self._take("file", PlannedMotion(motion, f"dhkit.Trajectory.load({name!r})  # downloaded as NPZ"))
+        self._take(
+            "file", PlannedMotion(motion, f"dhkit.Trajectory.load({name!r})  # downloaded as NPZ")
+        )
 
     @answers("motion.play")
     def play(self, _: Fields) -> None:
@@ -183,7 +192,10 @@ class MotionPanel(Panel):
         """Return the motion as a file."""
         kind = fields.choice("format", ("csv", "npz"))
         motion = self._require_motion("motion.download")
-        return {"name": f"{self.desk.arm.name}-motion.{kind}", "content": file_content(motion, kind)}
+        return {
+            "name": f"{self.desk.arm.name}-motion.{kind}",
+            "content": file_content(motion, kind),
+        }
 
     @answers("waypoints.add")
     def add_waypoint(self, _: Fields) -> None:
@@ -235,14 +247,18 @@ class MotionPanel(Panel):
         """Return the motion, which the arm can be moved along only while no controller moves it."""
         motion = self._require_motion(request)
         if self.desk.running:
-            raise ValueError(f"{request}: a controller moves the arm; expected it to be stopped first")
+            raise ValueError(
+                f"{request}: a controller moves the arm; expected it to be stopped first"
+            )
         return motion
 
     def _plan_through_waypoints(self, kind: str, duration: float | None) -> JsonObject | None:
         arm = self.desk.arm
         points = [q.copy() for q in self.waypoints]
         if kind not in ("quintic", "least-time"):
-            raise ValueError("motion.plan: waypoints are gone through by a quintic spline or in least time alone")
+            raise ValueError(
+                "motion.plan: waypoints are gone through by a quintic spline or in least time alone"
+            )
         if len(points) < 2:
             raise ValueError("motion.plan: fewer than 2 waypoints; expected some to go through")
         for k, (q, next_q) in enumerate(pairwise(points), start=1):
@@ -261,7 +277,11 @@ class MotionPanel(Panel):
         scene = self.desk.scene
         start, *via, goal = points
         through = f", via={literal(via)}" if via else ""
-        around = f", obstacles=[{', '.join(each.call for each in self._obstacles.placed)}]" if scene else ""
+        around = (
+            f", obstacles=[{', '.join(each.call for each in self._obstacles.placed)}]"
+            if scene
+            else ""
+        )
         call = f"arm.plan({literal(start)}, {literal(goal)}{through}{around})"
 
         def work(job: Job) -> PlannedMotion:
@@ -276,14 +296,20 @@ class MotionPanel(Panel):
         return work
 
     def _start_job(self, title: str, work: Callable[[Job], PlannedMotion]) -> JsonObject:
-        return {"job": self.jobs.start(title, work, lambda planned: self._take(title, planned, by_job=True))}
+        return {
+            "job": self.jobs.start(
+                title, work, lambda planned: self._take(title, planned, by_job=True)
+            )
+        }
 
     def _take(self, kind: str, planned: PlannedMotion, by_job: bool = False) -> None:
         """Publish the numbers of a motion, and play it unless a controller moves the arm; contacts are added later."""
         motion = planned.motion
         arm = self.desk.arm
         if motion.duration > MAX_DURATION:
-            raise ValueError(f"the motion lasts {motion.duration:g} s; expected at most {MAX_DURATION:g} s")
+            raise ValueError(
+                f"the motion lasts {motion.duration:g} s; expected at most {MAX_DURATION:g} s"
+            )
         # The times at which limits are looked at contain those that are plotted.
         times = limit_times(motion)
         q = motion.q(times)
@@ -356,7 +382,10 @@ class MotionPanel(Panel):
             call()
 
     def _publish_waypoints(self) -> None:
-        points = [{"name": f"waypoint {k}", "q": q.tolist()} for k, q in enumerate(self.waypoints, start=1)]
+        points = [
+            {"name": f"waypoint {k}", "q": q.tolist()}
+            for k, q in enumerate(self.waypoints, start=1)
+        ]
         self.desk.view.panel("waypoints", points)
 
     def _forget(self) -> None:
@@ -383,7 +412,9 @@ def _file_of(fields: Fields, suffixes: Collection[str]) -> tuple[str, bytes]:
     """Return the suffix and the content of the file that a request holds."""
     suffix = Path(fields.text("name")).suffix.lower()
     if suffix not in suffixes:
-        raise ValueError(f"{fields.request}: name ends in {suffix[:10]!r}; expected {', '.join(suffixes)}")
+        raise ValueError(
+            f"{fields.request}: name ends in {suffix[:10]!r}; expected {', '.join(suffixes)}"
+        )
     try:
         return suffix, base64.b64decode(fields.text("content", MAX_FILE_LENGTH), validate=True)
     except (binascii.Error, ValueError):
@@ -406,7 +437,9 @@ class Circle(NamedTuple):
         """Return the motion from joint values, shape (n,), in a duration, s; the shortest if None."""
         q0 = literal(start)
         call = f"arm.circle(arm.fk({q0}), {literal(self.centre)}, {self.axis}, q0={q0}, duration={duration!r})"
-        return PlannedMotion(arm.circle(arm.fk(start), self.centre, self.axis, q0=start, duration=duration), call)
+        return PlannedMotion(
+            arm.circle(arm.fk(start), self.centre, self.axis, q0=start, duration=duration), call
+        )
 
 
 def _circles(arm: Arm, start: Array, goal: Fields) -> list[Circle]:
@@ -430,11 +463,15 @@ def _circles(arm: Arm, start: Array, goal: Fields) -> list[Circle]:
         if length > MIN_LENGTH:
             circles.append(Circle(position + radius * towards / length, PLANES[plane]))
     if not circles:
-        raise DescriptionError("the tool stands on the normal through the origin; expected a centre, or another place")
+        raise DescriptionError(
+            "the tool stands on the normal through the origin; expected a centre, or another place"
+        )
     return circles
 
 
-def _first_circle(arm: Arm, start: Array, circles: list[Circle], duration: float | None) -> PlannedMotion:
+def _first_circle(
+    arm: Arm, start: Array, circles: list[Circle], duration: float | None
+) -> PlannedMotion:
     """Return the motion along the first circle that the arm can follow."""
     for circle in circles[:-1]:
         try:

@@ -86,8 +86,15 @@ class ObstaclePanel(Panel):
             raise ValueError("obstacles.add: there is a floor already; expected one at most")
         reach = self.desk.arm.description.reach or 1.0
         size = FIRST_SIZE * reach
-        sizes = {"box": (size, size, 2 * size), "sphere": (size / 2,), "cylinder": (size / 2, 2 * size), "floor": ()}
-        obstacle = PlacedObstacle(self._free_name(kind), kind, sizes[kind], self._first_pose(kind, reach))
+        sizes = {
+            "box": (size, size, 2 * size),
+            "sphere": (size / 2,),
+            "cylinder": (size / 2, 2 * size),
+            "floor": (),
+        }
+        obstacle = PlacedObstacle(
+            self._free_name(kind), kind, sizes[kind], self._first_pose(kind, reach)
+        )
         self._take([*self.placed, obstacle])
         return {"index": len(self.placed) - 1}
 
@@ -99,7 +106,9 @@ class ObstaclePanel(Panel):
         if "sizes" in fields:
             sizes = fields.vector("sizes", KINDS[obstacle.kind], MAX_SIZE)
             if (sizes < MIN_SIZE).any():
-                raise ValueError(f"obstacles.set: sizes are {sizes.tolist()}; expected at least {MIN_SIZE:g} m each")
+                raise ValueError(
+                    f"obstacles.set: sizes are {sizes.tolist()}; expected at least {MIN_SIZE:g} m each"
+                )
             obstacle = replace(obstacle, sizes=tuple(sizes.tolist()))
         if "T" in fields:
             T = fields.pose("T")
@@ -124,7 +133,12 @@ class ObstaclePanel(Panel):
     def publish(self) -> None:
         """Send the obstacles to the pages."""
         state = [
-            {"name": each.name, "kind": each.kind, "sizes": list(each.sizes), "T": each.T.ravel().tolist()}
+            {
+                "name": each.name,
+                "kind": each.kind,
+                "sizes": list(each.sizes),
+                "T": each.T.ravel().tolist(),
+            }
             for each in self.placed
         ]
         self.desk.view.panel("obstacles", state)

@@ -113,7 +113,9 @@ class OwnPanel(Panel):
             The program defines none.
         """
         if self.source is None or not self.has_controller:
-            raise ValueError("control: there is no controller of your own; expected --mine FILE with one")
+            raise ValueError(
+                "control: there is no controller of your own; expected --mine FILE with one"
+            )
         if self._controller_program is not None:
             self._controller_program.close()
         program = self._controller_program = Program(self.source, CALL_LIMITS, self._isolation)
@@ -172,7 +174,9 @@ class OwnPanel(Panel):
         try:
             program.start()
         except ProgramError as error:
-            self._publish(loading=False, error=str(error), output=program.output[-MAX_OUTPUT_LENGTH:])
+            self._publish(
+                loading=False, error=str(error), output=program.output[-MAX_OUTPUT_LENGTH:]
+            )
             return
         self._functions = program.functions
         self._publish(loading=False, error=None, functions=list(program.functions))
@@ -221,7 +225,9 @@ class OwnPanel(Panel):
         T = arm.fk(q)
         solutions = program.ik(T, arm.n)
         finite = solutions[np.isfinite(solutions).all(axis=1)]
-        right = sum(bool(np.abs(arm.fk(solution) - T).max() < POSE_TOLERANCE) for solution in finite)
+        right = sum(
+            bool(np.abs(arm.fk(solution) - T).max() < POSE_TOLERANCE) for solution in finite
+        )
         shown = finite[:MAX_SOLUTIONS]
         if self._shows_ghosts and not self.desk.running:
             self.desk.view.ghosts(shown if len(shown) else None)
@@ -243,7 +249,9 @@ class OwnPanel(Panel):
         def work(job: Job) -> Mapping[str, object]:
             try:
                 with program:
-                    return check(arm, program, samples=SCORE_SAMPLES, progress=job.progress).to_dict()
+                    return check(
+                        arm, program, samples=SCORE_SAMPLES, progress=job.progress
+                    ).to_dict()
             except DhkitError as error:
                 return {"error": str(error)}
 

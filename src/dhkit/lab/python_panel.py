@@ -121,11 +121,17 @@ class PythonPanel(Panel):
             text = "# The run follows the motion's joints that are free: arm.simulate takes a motion of these alone."
             return [*lines, text]
         if settings.controller == OWN:
-            return [*lines, "# The controller is your own program's: give arm.simulate a function in its place."]
-        controller = CONSTRUCTORS[settings.controller].format(w=repr(settings.bandwidth), z=repr(settings.damping))
+            return [
+                *lines,
+                "# The controller is your own program's: give arm.simulate a function in its place.",
+            ]
+        controller = CONSTRUCTORS[settings.controller].format(
+            w=repr(settings.bandwidth), z=repr(settings.damping)
+        )
         if settings.gains is not None:
-            kp, ki, kd = ([gain[i] for i in self.control.free] for gain in settings.gains)
-            controller = f"dhkit.PID({kp}, {ki}, {kd}, limit=arm.description.numbers.effort)"
+            gains = np.array(settings.gains)[:, self.control.free].tolist()
+            listed = ", ".join(str(gain) for gain in gains)
+            controller = f"dhkit.PID({listed}, limit=arm.description.numbers.effort)"
         if settings.compensate:
             controller = f"dhkit.FrictionCompensation({controller}, arm)"
         arguments = ["controller", literal(self.control.setpoint), "duration=5.0", "q0=q"]

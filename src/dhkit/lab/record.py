@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +23,15 @@ from dhkit.description import Array, write_atomically
 from dhkit.description.files import read_bounded
 from dhkit.display import counted, plain, repr_line
 from dhkit.errors import AnswerError, DescriptionError
-from dhkit.lab.assignment import Assignment, Condition, JointsAt, MotionBetween, NumberIs, ToolAt
+from dhkit.lab.assignment import (
+    Assignment,
+    Condition,
+    JointsAt,
+    MotionBetween,
+    NumberIs,
+    Place,
+    ToolAt,
+)
 from dhkit.trajectories import Trajectory
 from dhkit.trajectories.bounds import BOUNDS
 from dhkit.viewer.motion import exceeded_limit
@@ -43,13 +51,6 @@ _KEY = b"dhkit record of an assignment, format 1, "
 def now() -> str:
     """Return the time in UTC, in ISO 8601 with seconds."""
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-class Place(NamedTuple):
-    """The place of a goal in an assignment, counted from 0."""
-
-    step: int
-    goal: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,10 @@ class Record:
             "begun": self.begun,
             "goals": goals,
         }
-        write_atomically(path, json.dumps(content | {"seal": _seal(content)}, indent=1, ensure_ascii=False) + "\n")
+        write_atomically(
+            path,
+            json.dumps(content | {"seal": _seal(content)}, indent=1, ensure_ascii=False) + "\n",
+        )
 
     @classmethod
     def read(cls, path: Path) -> Record:
@@ -126,17 +130,25 @@ class Record:
                 reached[place] = Reached(str(goal["time"]), dict(goal["evidence"]))
             student = plain(str(content["student"]), MAX_NAME_LENGTH)
             record = cls(str(content["assignment"]), student, str(content["begun"]), reached)
-            is_whole = isinstance(seal, str) and hmac.compare_digest(seal.encode("ascii"), _seal(content).encode())
+            is_whole = isinstance(seal, str) and hmac.compare_digest(
+                seal.encode("ascii"), _seal(content).encode()
+            )
         except DescriptionError as error:
             raise AnswerError(str(error)) from None
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
-            raise AnswerError(f"{path}: no record of a lab; expected the file that dhkit lab --record wrote") from None
+            raise AnswerError(
+                f"{path}: no record of a lab; expected the file that dhkit lab --record wrote"
+            ) from None
         if not is_whole:
-            raise AnswerError(f"{path}: the seal does not fit; the record was edited after the lab wrote it")
+            raise AnswerError(
+                f"{path}: the seal does not fit; the record was edited after the lab wrote it"
+            )
         return record
 
     def __repr__(self) -> str:
-        return repr_line("Record", self.student or "without a name", counted(len(self.reached), "goal"))
+        return repr_line(
+            "Record", self.student or "without a name", counted(len(self.reached), "goal")
+        )
 
 
 def record_path(folder: Path, assignment_file: Path) -> Path:
@@ -158,9 +170,13 @@ def taken_up(file: Path, assignment: Assignment) -> Record:
         return Record(assignment.digest)
     record = Record.read(file)
     if record.digest != assignment.digest:
-        raise DescriptionError(f"{file}: a record of another assignment; expected another folder for this one")
-    goals = {Place(i, j) for i, step in enumerate(assignment.steps) for j in range(len(step.goals))}
-    return replace(record, reached={place: found for place, found in record.reached.items() if place in goals})
+        raise DescriptionError(
+            f"{file}: a record of another assignment; expected another folder for this one"
+        )
+    reached = {
+        place: record.reached[place] for place in assignment.places if place in record.reached
+    }
+    return replace(record, reached=reached)
 
 
 def motion_evidence(motion: Trajectory) -> dict[str, Any]:
@@ -168,7 +184,9 @@ def motion_evidence(motion: Trajectory) -> dict[str, Any]:
     return {"breaks": motion.breaks.tolist(), "coefficients": motion.coefficients.tolist()}
 
 
-def is_confirmed(assignment: Assignment, condition: Condition, evidence: Mapping[str, Any]) -> bool | None:
+def is_confirmed(
+    assignment: Assignment, condition: Condition, evidence: Mapping[str, Any]
+) -> bool | None:
     """Return whether the evidence shows that a goal was reached; None for evidence that cannot be checked again.
 
     Raises

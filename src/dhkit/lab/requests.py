@@ -49,13 +49,19 @@ class Fields:
         self.data = data
         unknown = next((name for name in data if name not in known), None)
         if unknown is not None:
-            raise ValueError(f"{request}: found field {str(unknown)[:40]!r}; expected {', '.join(known) or 'none'}")
+            raise ValueError(
+                f"{request}: found field {str(unknown)[:40]!r}; expected {', '.join(known) or 'none'}"
+            )
 
     def __contains__(self, name: str) -> bool:
         return self.data.get(name) is not None
 
     def number(
-        self, name: str, lower: float = -math.inf, upper: float = math.inf, default: float | None = None
+        self,
+        name: str,
+        lower: float = -math.inf,
+        upper: float = math.inf,
+        default: float | None = None,
     ) -> float:
         """Return a finite number.
 
@@ -103,7 +109,10 @@ class Fields:
         """
         T = self.vector(name, 16).reshape(4, 4)
         R = T[:3, :3]
-        if max(np.abs(T[3] - [0, 0, 0, 1]).max(), np.abs(R.T @ R - np.eye(3)).max()) > ROTATION_TOLERANCE:
+        if (
+            max(np.abs(T[3] - [0, 0, 0, 1]).max(), np.abs(R.T @ R - np.eye(3)).max())
+            > ROTATION_TOLERANCE
+        ):
             raise self._error(name, "a pose: a rotation and a position, by row")
         if np.linalg.det(R) < 0:
             raise self._error(name, "a right-handed frame")
@@ -135,7 +144,9 @@ class Fields:
         return value
 
     def _error(self, name: str, expected: str) -> ValueError:
-        return ValueError(f"{self.request}: {name} is {str(self.data.get(name))[:60]!r}; expected {expected}")
+        return ValueError(
+            f"{self.request}: {name} is {str(self.data.get(name))[:60]!r}; expected {expected}"
+        )
 
 
 def _is_double(value: object) -> bool:
@@ -155,7 +166,9 @@ class RequestHandler:
     """Called with the panel and the fields; None is sent as an empty object."""
 
 
-def answers(request: str, *fields: str) -> Callable[[Callable[..., JsonObject | None]], RequestHandler]:
+def answers(
+    request: str, *fields: str
+) -> Callable[[Callable[..., JsonObject | None]], RequestHandler]:
     """Return a decorator that declares a panel's method as the handler of a request with these fields."""
     return lambda method: RequestHandler(request, fields, method)
 
@@ -179,9 +192,13 @@ class Panel:
         """Return the handlers of this panel's requests, by the requests' names."""
 
         def bound(handler: RequestHandler) -> Callable[[JsonObject], JsonObject]:
-            return lambda data: handler.method(self, Fields(handler.request, data, handler.fields)) or {}
+            return lambda data: (
+                handler.method(self, Fields(handler.request, data, handler.fields)) or {}
+            )
 
-        declared = [value for value in vars(type(self)).values() if isinstance(value, RequestHandler)]
+        declared = [
+            value for value in vars(type(self)).values() if isinstance(value, RequestHandler)
+        ]
         return {handler.request: bound(handler) for handler in declared}
 
     def publish(self) -> None:

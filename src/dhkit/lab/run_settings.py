@@ -127,7 +127,9 @@ class Settings:
             given.flag("compensate", self.compensate),
             ReferenceKind(given.choice("reference", list(ReferenceKind), self.reference)),
         )
-        is_tuned_anew = any(getattr(settings, name) != getattr(self, name) for name in TUNING_SETTINGS)
+        is_tuned_anew = any(
+            getattr(settings, name) != getattr(self, name) for name in TUNING_SETTINGS
+        )
         return settings if is_tuned_anew else replace(settings, gains=self.gains)
 
     @property

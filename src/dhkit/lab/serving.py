@@ -89,7 +89,9 @@ def serve(
     if port is not None and not 1024 <= port < 65_536:
         raise ValueError(f"port is {port}; expected 1024 to 65535")
     if record is not None and not isinstance(assignment, (str, Path)):
-        raise ValueError("record is given without the file of an assignment; expected assignment=PATH beside it")
+        raise ValueError(
+            "record is given without the file of an assignment; expected assignment=PATH beside it"
+        )
     file = None
     if isinstance(assignment, (str, Path)):
         if record is not None:
@@ -128,19 +130,27 @@ def kept_token(port: int) -> str:
     path = folder / f"lab-{port}.token"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if os.name == "posix" and (folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o022):
+        if os.name == "posix" and (
+            folder.stat().st_uid != os.getuid() or folder.stat().st_mode & 0o022
+        ):
             raise ModelError(
                 f"{folder} can be written by others; expected a folder that this user owns and nobody else can write to"
             )
         if _is_private(path):
             token = path.read_bytes()[:MAX_TOKEN_LENGTH].decode("ascii", errors="replace").strip()
-            if len(token) >= TOKEN_LENGTH and token.replace("-", "").replace("_", "").isalnum() and token.isascii():
+            if (
+                len(token) >= TOKEN_LENGTH
+                and token.replace("-", "").replace("_", "").isalnum()
+                and token.isascii()
+            ):
                 return token
         token = secrets.token_urlsafe(16)
         write_atomically(path, token, private=True)
         return token
     except OSError as error:
-        raise ModelError(f"{path}: {error.strerror}; expected a place for the lab's token, or no --port") from None
+        raise ModelError(
+            f"{path}: {error.strerror}; expected a place for the lab's token, or no --port"
+        ) from None
 
 
 def _is_private(path: Path) -> bool:

@@ -62,7 +62,9 @@ class SubmitPanel(Panel):
         text = fields.text("text", MAX_ANSWER_LENGTH)
         self._clear()  # an answer that is refused must not leave the verdict of another
         if not text.strip():
-            raise ValueError("submit.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot")
+            raise ValueError(
+                "submit.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot"
+            )
         text = text.encode("utf-8", "replace").decode()  # UTF-8 has no lone surrogates
         content = _sheet(text) if kind == "lines" else text
         description = self.desk.arm.description
@@ -118,7 +120,9 @@ def _sheet(text: str) -> str:
         elif name is not None:
             entries[name] = f"{entries[name]} {line.strip()}".strip()
         elif line.strip():
-            raise ValueError(f"submit.grade: line {number}: found {line.strip()[:40]!r}; expected such as M11 = ...")
+            raise ValueError(
+                f"submit.grade: line {number}: found {line.strip()[:40]!r}; expected such as M11 = ..."
+            )
     return tomlkit.dumps({"format": 1, "answer": entries})
 
 
@@ -127,7 +131,9 @@ def _require_robot(text: str, name: str) -> None:
     with suppress(TOMLKitError):
         robot = tomlkit.parse(text).get("robot")
         if isinstance(robot, str) and Path(robot).stem != name:
-            raise ValueError(f"submit.grade: the sheet is about {str(robot)[:60]!r}; the arm here is {name}")
+            raise ValueError(
+                f"submit.grade: the sheet is about {str(robot)[:60]!r}; the arm here is {name}"
+            )
 
 
 def _judge(description: Description, text: str, suffix: str, job: Job) -> JsonObject:
@@ -145,10 +151,25 @@ def _judge(description: Description, text: str, suffix: str, job: Job) -> JsonOb
         robot, answer, report, errors = (Path(folder) / name for name in names)
         robot.write_text(to_toml(bare), "utf-8")
         answer.write_text(text, "utf-8")
-        command = [sys.executable, "-c", GRADE_SCRIPT, "grade", str(answer), "--robot", str(robot), "--format", "json"]
+        command = [
+            sys.executable,
+            "-c",
+            GRADE_SCRIPT,
+            "grade",
+            str(answer),
+            "--robot",
+            str(robot),
+            "--format",
+            "json",
+        ]
         with report.open("wb") as out, errors.open("wb") as err:
             process = subprocess.Popen(  # noqa: S603 - our own program, with files of ours
-                command, cwd=folder, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+                command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=err,
+                start_new_session=True,
             )
         deadline = time.monotonic() + MAX_JUDGING_TIME
         try:
@@ -174,7 +195,10 @@ def _report_state(report: GradeReport, folder: str) -> JsonObject:
         "verdict": report.verdict.value,
         "entries": [_entry_state(entry) for entry in report.entries if entry.answer],
         "missing": list(report.missing),
-        "diagnosis": [{name: getattr(d, name) for name in ("place", "sentence", "hint")} for d in report.diagnosis],
+        "diagnosis": [
+            {"place": found.place, "sentence": found.sentence, "hint": found.hint}
+            for found in report.diagnosis
+        ],
         "notes": [note_text(note) for note in report.notes],
     }
 

@@ -36,6 +36,11 @@ class Table:
         """Return the table of an arm."""
         return cls(table_texts(description), description)
 
+    @property
+    def has_shapes(self) -> bool:
+        """Whether meshes of the arm are known."""
+        return any(joint.shapes for joint in self.description.joints)
+
 
 @dataclass(frozen=True, eq=False)
 class WholeArm:
@@ -128,14 +133,20 @@ class TablePanel(Panel):
         arm = self.desk.arm
         free = fields.data.get("free")
         if not isinstance(free, list) or not all(type(i) is int and 0 <= i < arm.n for i in free):
-            raise ValueError(f"table.lock: free is {str(free)[:40]}; expected numbers of joints, 1 to {arm.n}")
+            raise ValueError(
+                f"table.lock: free is {str(free)[:40]}; expected numbers of joints, 1 to {arm.n}"
+            )
         if self.whole is not None:
-            raise ValueError("table.lock: joints are locked already; expected all joints to be freed first")
+            raise ValueError(
+                "table.lock: joints are locked already; expected all joints to be freed first"
+            )
         if not 0 < len(set(free)) < arm.n:
             raise ValueError(f"table.lock: {len(set(free))} joints move; expected 1 to {arm.n - 1}")
         locked = tuple(i for i in range(arm.n) if i not in free)
         # The table's arm has no assumed bodies: those of the shorter arm are assumed anew, for each of its links.
-        whole = WholeArm(Arm(self._table.description), self._first, self._table, self._undo, self._redo, locked)
+        whole = WholeArm(
+            Arm(self._table.description), self._first, self._table, self._undo, self._redo, locked
+        )
         shorter = whole.arm.lock(whole.values)
         table = Table.of(shorter.description)
         self._replace(shorter, self.desk.q[sorted(set(free))])
@@ -166,7 +177,10 @@ class TablePanel(Panel):
         """Return the arm as a robot file or a URDF."""
         kind = fields.choice("format", ("toml", "urdf"))
         arm = self.desk.arm
-        return {"name": f"{arm.name}.{kind}", "text": to_toml(arm.description) if kind == "toml" else arm.urdf()}
+        return {
+            "name": f"{arm.name}.{kind}",
+            "text": to_toml(arm.description) if kind == "toml" else arm.urdf(),
+        }
 
     def publish(self) -> None:
         """Send the table to the pages."""
@@ -175,10 +189,17 @@ class TablePanel(Panel):
         description = table.description
         numbers = description.numbers
         rows = [
-            {"joint": joint.name, "kind": "R" if joint.is_revolute else "P", **dict(zip(COLUMNS, texts, strict=True))}
+            {
+                "joint": joint.name,
+                "kind": "R" if joint.is_revolute else "P",
+                **dict(zip(COLUMNS, texts, strict=True)),
+            }
             for joint, texts in zip(description.joints, table.texts, strict=True)
         ]
-        errors = [{"row": row, "column": COLUMNS[k], "error": text} for (row, k), text in table.errors.items()]
+        errors = [
+            {"row": row, "column": COLUMNS[k], "error": text}
+            for (row, k), text in table.errors.items()
+        ]
         same_convention = description.convention is first.description.convention
         self.desk.view.panel(
             "table",
@@ -202,8 +223,7 @@ class TablePanel(Panel):
         first_fit, fit = (classify(table.description).fit for table in (self._first, self._table))
         if first_fit is not None and fit is None:
             return "this table has no closed form: the tool is followed by iteration"
-        had_shapes, has_shapes = (any(j.shapes for j in t.description.joints) for t in (self._first, self._table))
-        if had_shapes and not has_shapes:
+        if self._first.has_shapes and not self._table.has_shapes:
             return "drawn from the table: the arm's meshes fit its own lengths alone"
         return None
 
@@ -228,15 +248,22 @@ class TablePanel(Panel):
             )
             description = replace(last, joints=joints)
             numbers = description.numbers
-            beyond = np.argwhere(~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= MAX_ENTRY))
+            beyond = np.argwhere(
+                ~(np.abs([getattr(numbers, name) for name in COLUMNS]) <= MAX_ENTRY)
+            )
             if len(beyond):
-                too_large = {(int(i), int(k)): f"{COLUMNS[k]}: beyond {MAX_ENTRY:g}" for k, i in beyond}
+                too_large = {
+                    (int(i), int(k)): f"{COLUMNS[k]}: beyond {MAX_ENTRY:g}" for k, i in beyond
+                }
                 return Table(texts, last, too_large)
-            first = self._first.description  # who types the first arm's numbers again has it again, with its meshes
+            first = (
+                self._first.description
+            )  # who types the first arm's numbers again has it again, with its meshes
             return Table(texts, first if description == _without_meshes(first) else description)
         except (DhkitError, ValueError) as error:
-            changed = [(i, k) for i, row in enumerate(texts) for k in range(4) if row[k] != self._table.texts[i][k]]
-            return Table(texts, last, dict.fromkeys(changed or [(0, 0)], str(error)))
+            changed = np.argwhere(np.array(texts) != np.array(self._table.texts))
+            cells = [(int(i), int(k)) for i, k in changed] or [(0, 0)]
+            return Table(texts, last, dict.fromkeys(cells, str(error)))
 
     def _take(self, table: Table) -> None:
         """Show a table, as a change that can be undone."""
@@ -295,7 +322,9 @@ def plain_expression(text: str) -> str:
 
 def _without_meshes(description: Description) -> Description:
     """Return a description whose links are drawn from the table: meshes do not fit other lengths."""
-    return replace(description, joints=tuple(replace(joint, shapes=()) for joint in description.joints))
+    return replace(
+        description, joints=tuple(replace(joint, shapes=()) for joint in description.joints)
+    )
 
 
 def _elementary_transforms(description: Description, q: Array, row: int) -> list[tuple[str, Array]]:

@@ -24,6 +24,7 @@ from dhkit.lab.assignment import (
     MotionBetween,
     NumberIs,
     OwnScore,
+    Place,
     ToolAt,
 )
 from dhkit.lab.assignment_form import MAX_GOALS, MAX_STEPS
@@ -31,7 +32,7 @@ from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import Desk
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
-from dhkit.lab.record import MAX_NAME_LENGTH, Place, Reached, Record, motion_evidence, now, taken_up
+from dhkit.lab.record import MAX_NAME_LENGTH, Reached, Record, motion_evidence, now, taken_up
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import plain_expression
@@ -101,9 +102,13 @@ class TaskPanel(Panel):
     def reset(self, _: Fields) -> None:
         """Forget which goals have been reached."""
         if self.assignment is None:
-            raise ValueError("task.reset: there is no assignment; expected a lab that was opened with one")
+            raise ValueError(
+                "task.reset: there is no assignment; expected a lab that was opened with one"
+            )
         if self._file is not None:
-            raise ValueError("task.reset: the work is recorded; expected --record with another folder to begin anew")
+            raise ValueError(
+                "task.reset: the work is recorded; expected --record with another folder to begin anew"
+            )
         with self._lock:
             self._reached.clear()
             self._left.clear()
@@ -126,7 +131,9 @@ class TaskPanel(Panel):
     @answers("task.number", "step", "goal", "text")
     def take_number(self, fields: Fields) -> JsonObject:
         """Compare a typed number, an expression such as 0.6 or pi/2, with a goal's; tell whether it is right."""
-        place = Place(fields.integer("step", 0, MAX_STEPS - 1), fields.integer("goal", 0, MAX_GOALS - 1))
+        place = Place(
+            fields.integer("step", 0, MAX_STEPS - 1), fields.integer("goal", 0, MAX_GOALS - 1)
+        )
         condition = dict(self._conditions()).get(place)
         if not isinstance(condition, NumberIs):
             raise ValueError("task.number: that goal asks for no number")
@@ -142,7 +149,9 @@ class TaskPanel(Panel):
     def publish(self) -> None:
         """Send the assignment, and the goals reached, to the pages."""
         with self._lock:
-            self.desk.view.panel("task", None if self.assignment is None else self._state(self.assignment))
+            self.desk.view.panel(
+                "task", None if self.assignment is None else self._state(self.assignment)
+            )
 
     def _state(self, assignment: Assignment) -> dict[str, object]:
         steps = []
@@ -151,12 +160,19 @@ class TaskPanel(Panel):
             for j, goal in enumerate(step.goals):
                 asks_number = isinstance(goal.condition, NumberIs)
                 is_met = Place(i, j) in self._reached
-                goals.append({"text": goal.text, "points": goal.points, "met": is_met, "number": asks_number})
-            steps.append({"title": step.title, "text": step.text, "panel": step.panel, "goals": goals})
+                goals.append(
+                    {"text": goal.text, "points": goal.points, "met": is_met, "number": asks_number}
+                )
+            steps.append(
+                {"title": step.title, "text": step.text, "panel": step.panel, "goals": goals}
+            )
         return {
             "title": assignment.title,
             "panels": None if assignment.panels is None else list(assignment.panels),
-            "points": sum(assignment.steps[place.step].goals[place.goal].points for place in sorted(self._reached)),
+            "points": sum(
+                assignment.steps[place.step].goals[place.goal].points
+                for place in sorted(self._reached)
+            ),
             "most": assignment.points,
             "note": self._note(),
             "steps": steps,
@@ -169,7 +185,9 @@ class TaskPanel(Panel):
             return self._fault
         if not self._is_assigned_arm:
             return "The table was edited: goals count again after its Reset."
-        if self.own.source is None and any(isinstance(condition, OwnScore) for _, condition in self._conditions()):
+        if self.own.source is None and any(
+            isinstance(condition, OwnScore) for _, condition in self._conditions()
+        ):
             return "Some goals ask for a program of your own: start the lab with --mine FILE."
         return None
 
@@ -205,18 +223,30 @@ class TaskPanel(Panel):
         excess = self.motions.excess
         if motion is not None and self._is_assigned_arm:
             evidence = motion_evidence(motion)
-            self._check(lambda goal: isinstance(goal, MotionBetween) and goal.is_reached(motion, excess), evidence)
+            self._check(
+                lambda goal: isinstance(goal, MotionBetween) and goal.is_reached(motion, excess),
+                evidence,
+            )
 
     def _check_score(self, arm: Arm, report: Mapping[str, object]) -> None:
         """Check goals of a program at its score beside an arm."""
-        if self.assignment is not None and _moves_alike(arm.description, self.assignment.arm.description):
+        if self.assignment is not None and _moves_alike(
+            arm.description, self.assignment.arm.description
+        ):
             evidence = {"functions": report.get("functions", {})}
-            self._check(lambda goal: isinstance(goal, OwnScore) and goal.is_reached(report), evidence)
+            self._check(
+                lambda goal: isinstance(goal, OwnScore) and goal.is_reached(report), evidence
+            )
 
     def _check_answer(self, text: str, right: Collection[str]) -> None:
         """Check goals of answers: ``text`` is what was judged, and ``right`` the names of its right entries."""
-        if self.assignment is not None and self.desk.arm.description == self.assignment.arm.description:
-            self._check(lambda goal: isinstance(goal, AnswerRight) and goal.name in right, {"answer": text})
+        if (
+            self.assignment is not None
+            and self.desk.arm.description == self.assignment.arm.description
+        ):
+            self._check(
+                lambda goal: isinstance(goal, AnswerRight) and goal.name in right, {"answer": text}
+            )
 
     def _check_run(self, t: float, desired: Array, errors: Array) -> None:
         """Check goals of controllers at a time of a run, s, its desired values and errors, shape (k,), rad and m."""
@@ -240,14 +270,20 @@ class TaskPanel(Panel):
             # What stands still is followed by any controller.
             moves = (highest - lowest).max() >= LEAST_STROKE * condition.error
             if t - run_so_far.begin >= condition.seconds and moves:
-                run = {"controller": settings.controller, "bandwidth": settings.bandwidth, "payload": settings.payload}
+                run = {
+                    "controller": settings.controller,
+                    "bandwidth": settings.bandwidth,
+                    "payload": settings.payload,
+                }
                 reached[place] = {"run": run}
         self._take(reached)
 
     def _check(self, is_reached: Callable[[Condition], bool], evidence: JsonObject) -> None:
         with self._lock:
             reached = {
-                place: evidence for place, goal in self._conditions() if place not in self._reached and is_reached(goal)
+                place: evidence
+                for place, goal in self._conditions()
+                if place not in self._reached and is_reached(goal)
             }
         self._take(reached)
 
@@ -255,7 +291,9 @@ class TaskPanel(Panel):
         if reached:
             time = now()
             with self._lock:
-                self._reached |= {place: Reached(time, evidence) for place, evidence in reached.items()}
+                self._reached |= {
+                    place: Reached(time, evidence) for place, evidence in reached.items()
+                }
             self._write()
             self.publish()
 
@@ -288,5 +326,6 @@ def _moves_alike(first: Description, second: Description) -> bool:
     """Return whether two arms have the same table, base, tool and limits; their bodies may differ."""
     limits = ("lower", "upper", "velocity", "effort")
     return has_same_geometry(first, second) and all(
-        np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in limits
+        np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name))
+        for name in limits
     )

@@ -75,7 +75,9 @@ class ToolPanel(Panel):
     def set_pose(self, fields: Fields) -> JsonObject:
         """Move the target to a position and Euler angles."""
         order = fields.choice("order", EULER_ORDERS, self.desk.order)
-        return self._follow(pose(fields.vector("xyz", 3), euler=fields.vector("euler", 3), order=order))
+        return self._follow(
+            pose(fields.vector("xyz", 3), euler=fields.vector("euler", 3), order=order)
+        )
 
     @answers("tool.jog", "axis", "step", "frame")
     def jog(self, fields: Fields) -> JsonObject:
@@ -99,9 +101,14 @@ class ToolPanel(Panel):
         name = fields.text("branch")
         if self.T is None:
             raise ValueError("tool.choose: there is no target; expected one first")
-        branches = {branch.name: branch for branch in self._branches(*solve_pose(self.desk.arm, self.T, self.desk.q))}
+        branches = {
+            branch.name: branch
+            for branch in self._branches(*solve_pose(self.desk.arm, self.T, self.desk.q))
+        }
         if name not in branches:
-            raise ValueError(f"tool.choose: found {name[:40]!r}; expected a branch that reaches the target")
+            raise ValueError(
+                f"tool.choose: found {name[:40]!r}; expected a branch that reaches the target"
+            )
         if not branches[name].within_limits:
             raise ValueError(f"tool.choose: {name} is outside the joint limits, and only shown")
         self.chosen = name
@@ -147,7 +154,9 @@ class ToolPanel(Panel):
     def _follow(self, T: Array) -> JsonObject:
         """Take a target, shape (4, 4); show the arm at the chosen or nearest branch, and the others as ghosts."""
         if np.abs(T[:3, 3]).max() > MAX_DISTANCE:
-            raise ValueError(f"a target at {T[:3, 3].tolist()} m; expected at most {MAX_DISTANCE:g} m away")
+            raise ValueError(
+                f"a target at {T[:3, 3].tolist()} m; expected at most {MAX_DISTANCE:g} m away"
+            )
         snapped = False
         if self._plane is not None:
             offset = float(self._plane.normal @ (T[:3, 3] - self._plane.point))
@@ -164,7 +173,9 @@ class ToolPanel(Panel):
             desk.target_q = followed.q.copy()
             if not desk.running:
                 desk.show(desk.target_q)
-        others = [branch.q for branch in branches if followed is None or branch.name != followed.name]
+        others = [
+            branch.q for branch in branches if followed is None or branch.name != followed.name
+        ]
         if not desk.running:
             desk.view.ghosts(np.array(others) if others else None)
         T_reached = desk.arm.fk(desk.q if followed is None else followed.q)
@@ -183,7 +194,12 @@ class ToolPanel(Panel):
             "message": message,
             "chosen": chosen,
             "branches": [
-                {"name": b.name, "q": b.q.tolist(), "within": b.within_limits, "chosen": b.name == chosen}
+                {
+                    "name": b.name,
+                    "q": b.q.tolist(),
+                    "within": b.within_limits,
+                    "chosen": b.name == chosen,
+                }
                 for b in branches
             ],
             "numeric": by_iteration,
@@ -254,7 +270,11 @@ def _unreached_message(solutions: IKSolutions, *, outside_limits: bool) -> str:
         return "no solution was found"
     if distance == 0:
         return "the position is in reach, this orientation is not"
-    return f"out of reach by {distance:.3g} m" if distance >= 1 else f"out of reach by {1000 * distance:.3g} mm"
+    return (
+        f"out of reach by {distance:.3g} m"
+        if distance >= 1
+        else f"out of reach by {1000 * distance:.3g} mm"
+    )
 
 
 def _plane_of(arm: Arm) -> Plane | None:

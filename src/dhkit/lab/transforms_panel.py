@@ -70,8 +70,8 @@ class Solid:
     def box(cls, edges: tuple[float, float, float]) -> Solid:
         """Return a box with one corner at the origin and these edges, m; its lower vertices come first."""
         x, y, z = edges
-        bottom = [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)]
-        vertices = np.array([(a, b, height) for height in (0.0, z) for a, b in bottom])
+        bottom = np.array([(0.0, 0.0, 0.0), (x, 0.0, 0.0), (x, y, 0.0), (0.0, y, 0.0)])
+        vertices = np.concatenate([bottom, bottom + np.array([0.0, 0.0, z])])
         sides = [(i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4) for i in range(4)]
         quads = [(0, 3, 2, 1), (4, 5, 6, 7), *sides]
         faces = []
@@ -116,7 +116,9 @@ class TransformsPanel(Panel):
         """Read the numbers of the solid's file in another unit."""
         unit = fields.choice("unit", UNITS)
         if self.solid.unit is None:
-            raise ValueError("transforms.unit: the box has no file; expected a lab with --solid FILE")
+            raise ValueError(
+                "transforms.unit: the box has no file; expected a lab with --solid FILE"
+            )
         self.solid = self.solid.scaled(unit)
         self.publish()
 
@@ -141,7 +143,14 @@ class TransformsPanel(Panel):
             E = (rotation_about if kind == "turn" else translation_along)("xyz".index(axis), amount)
             T = T @ E if about == "current" else E @ T
             formulas = [mathml(latex) for latex in _formulas(k, kind, axis, amount, about)]
-            results.append({"amount": amount, "E": E.ravel().tolist(), "T": T.ravel().tolist(), "formulas": formulas})
+            results.append(
+                {
+                    "amount": amount,
+                    "E": E.ravel().tolist(),
+                    "T": T.ravel().tolist(),
+                    "formulas": formulas,
+                }
+            )
             # Who types more than a full turn may have meant degrees.
             if note is None and kind == "turn" and abs(amount) > math.tau:
                 degrees = f"{amount:.4g} rad are {np.degrees(amount):.4g}°"
@@ -175,7 +184,9 @@ def _amount(step: Fields) -> float:
 
 def _formulas(k: int, kind: str, axis: str, amount: float, about: str) -> tuple[str, str]:
     """Return the pose after step k, and its effect on points in the world, as LaTeX."""
-    size = f"{np.degrees(amount):.4g}^{{\\circ}}" if kind == "turn" else rf"{amount:.4g}\,\mathrm{{m}}"
+    size = (
+        f"{np.degrees(amount):.4g}^{{\\circ}}" if kind == "turn" else rf"{amount:.4g}\,\mathrm{{m}}"
+    )
     E = f"{'R' if kind == 'turn' else 'D'}_{{{axis}}}({size})"
     if about == "fixed":
         return f"T_{{{k}}} = {E} T_{{{k - 1}}}", f"p' = {E} p"

@@ -56,14 +56,18 @@ class WorkspacePanel(Panel):
             self.desk.view.points(positions, colors)
             self._publish(kind=kind, count=len(positions), progress=None, about=about)
 
-        self.jobs.start("workspace", lambda job: _sample(arm, tool if kind == "slice" else None, job), take)
+        self.jobs.start(
+            "workspace", lambda job: _sample(arm, tool if kind == "slice" else None, job), take
+        )
 
     @answers("workspace.read", "q")
     def read(self, fields: Fields) -> JsonObject:
         """Return how far the tool is from the boundary of its workspace."""
         arm = self.desk.arm
         nearest = boundary_distance(arm, fields.joint_values("q", arm.n))
-        return dict(zip(("distance", "boundary", "point"), nearest or (None, None, None), strict=True))
+        return dict(
+            zip(("distance", "boundary", "point"), nearest or (None, None, None), strict=True)
+        )
 
     def publish(self) -> None:
         """Send the drawing to the pages."""
@@ -168,7 +172,9 @@ def _sample(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, st
         # Distance from the plane through axis 1 (z) and the point: its normal is (-sin, cos) of the point's angle.
         angle = np.arctan2(towards[1], towards[0])
         offset = -np.sin(angle) * local[:, 0] + np.cos(angle) * local[:, 1]
-        chosen = np.flatnonzero(np.abs(offset) < HALF_THICKNESS * max(arm.description.reach, 1e-9))[:MAX_POINTS]
+        chosen = np.flatnonzero(np.abs(offset) < HALF_THICKNESS * max(arm.description.reach, 1e-9))[
+            :MAX_POINTS
+        ]
     about = "brighter: the tool moves more easily there"
     if space.assumed:
         about += "; assumed: " + ", ".join(space.assumed)

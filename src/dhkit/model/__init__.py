@@ -1,7 +1,13 @@
 """Descriptions as URDF and as Pinocchio model, shapes of links, and descriptions from URDFs and CAD files of others."""
 
 from dhkit.model.cad_assembly import CadImport, import_cad
-from dhkit.model.example_robots import ExampleChain, example_chains, example_robots, example_urdf, urdf_source
+from dhkit.model.example_robots import (
+    ExampleChain,
+    example_chains,
+    example_robots,
+    example_urdf,
+    urdf_source,
+)
 from dhkit.model.extraction import Extraction, Residual, extract_dh
 from dhkit.model.mass_report import ReportedMass, read_mass_report
 from dhkit.model.mesh_reader import read_mesh

@@ -36,7 +36,14 @@ from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
 from dhkit.model.cad_parts import CadPart, cad_parts, simplified
-from dhkit.model.cad_units import UNITS, Assembly, check_positions, check_size, distant_part_warnings, unit_of
+from dhkit.model.cad_units import (
+    UNITS,
+    Assembly,
+    check_positions,
+    check_size,
+    distant_part_warnings,
+    unit_of,
+)
 from dhkit.model.robot_folder import MESHES, copy_files, mesh_paths, model_errors
 from dhkit.model.shape_inertia import convex_hull
 from dhkit.model.stl import binary_stl
@@ -84,13 +91,21 @@ class CadImport:
                 raise ModelError(f"{folder} is not a folder; expected a new folder")
             has_content = folder.exists() and any(folder.iterdir())
             if has_content and not force:
-                again = "; --force (force=True) replaces an earlier import" if _is_import(folder) else ""
+                again = (
+                    "; --force (force=True) replaces an earlier import"
+                    if _is_import(folder)
+                    else ""
+                )
                 raise ModelError(f"{folder} is not empty; expected a new folder{again}")
             if has_content and not _is_import(folder):
-                raise ModelError(f"{folder} has files that an import does not make; expected a new folder")
+                raise ModelError(
+                    f"{folder} has files that an import does not make; expected a new folder"
+                )
             folder.absolute().parent.mkdir(parents=True, exist_ok=True)
             # Written under another name and renamed: a folder of this name is complete.
-            with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=f".{folder.name}.") as holder:
+            with tempfile.TemporaryDirectory(
+                dir=folder.absolute().parent, prefix=f".{folder.name}."
+            ) as holder:
                 complete = Path(holder) / "made"
                 complete.mkdir()
                 names = self._write_files(complete)
@@ -131,7 +146,9 @@ class CadImport:
             except ModelError:  # flat: collisions use the mesh itself
                 continue
             hulls[name] = name.replace(".stl", "_hull.stl")
-            files[hulls[name]] = binary_stl(f"hull of link {link} of {description.name}, m, dhkit", hull.corners)
+            files[hulls[name]] = binary_stl(
+                f"hull of link {link} of {description.name}, m, dhkit", hull.corners
+            )
         (folder / MESHES).mkdir()
         for name, content in files.items():
             write_atomically(folder / name, content)
@@ -140,11 +157,15 @@ class CadImport:
             for path in mesh_paths(description)
             if path not in files
         }
-        copies = {path: file for path, file in others.items() if file is not None and file.is_file()}
+        copies = {
+            path: file for path, file in others.items() if file is not None and file.is_file()
+        }
         copy_files(copies, folder)
         write_robot(description, folder / _ROBOT_FILE)
         written = read_robot(folder / _ROBOT_FILE)
-        text = urdf_text(written, mesh_path=lambda path: path, collision_path=lambda path: hulls.get(path, path))
+        text = urdf_text(
+            written, mesh_path=lambda path: path, collision_path=lambda path: hulls.get(path, path)
+        )
         write_atomically(folder / _URDF_FILE, text)
         return [_ROBOT_FILE, _URDF_FILE, *files, *copies]
 
@@ -201,8 +222,15 @@ def import_cad(
     parts, parts_note = cad_parts(folder, description.n, files=files, simplify=simplify)
     all_parts = chain.from_iterable(parts.values())
     check_positions({part.name: part.mesh for part in all_parts}, str(folder))
-    assembly, unit_note, is_usual = _in_metres(folder, description, world_to_frames(description, pose), parts, unit)
-    notes = [parts_note, pose_note, unit_note if is_usual else f"warning: {unit_note}", *stated.notes]
+    assembly, unit_note, is_usual = _in_metres(
+        folder, description, world_to_frames(description, pose), parts, unit
+    )
+    notes = [
+        parts_note,
+        pose_note,
+        unit_note if is_usual else f"warning: {unit_note}",
+        *stated.notes,
+    ]
     notes += distant_part_warnings(assembly)
 
     meshes = {}
@@ -215,7 +243,10 @@ def import_cad(
         own = [mesh.moved(to_frames[link]) for mesh in placed_meshes.pop(link)]
         bodies[link] = stated.body(link, own, to_frames[link])
         if simplify is not None:
-            own = [simplified(mesh, simplify, part.name) for mesh, part in zip(own, several, strict=True)]
+            own = [
+                simplified(mesh, simplify, part.name)
+                for mesh, part in zip(own, several, strict=True)
+            ]
         meshes[link] = joined_meshes(own)
         notes.append(_link_note(link, several, meshes[link], bodies[link]))
     for link in sorted((set(stated.masses) | set(stated.reports)) - set(parts)):
@@ -239,14 +270,20 @@ def _export_pose(description: Description, q: ArrayLike | None) -> tuple[Array, 
         pose = ready
         source = "the configuration ready"
     else:
-        return np.zeros(description.n), "pose of the export: all joint values 0 (the table has no configuration ready)"
+        return np.zeros(
+            description.n
+        ), "pose of the export: all joint values 0 (the table has no configuration ready)"
     joints = zip(description.joints, pose.tolist(), strict=True)
     values = ", ".join(f"{x:.4g}" if joint.is_revolute else f"{x:.4g} m" for joint, x in joints)
     return pose, f"pose of the export: {source}: q = {values}"
 
 
 def _in_metres(
-    folder: Path, description: Description, frames: Array, parts: Mapping[int, Sequence[CadPart]], unit: str | None
+    folder: Path,
+    description: Description,
+    frames: Array,
+    parts: Mapping[int, Sequence[CadPart]],
+    unit: str | None,
 ) -> tuple[Assembly, str, bool]:
     """Return the assembly with meshes in m, a note how their unit was found, and whether its size is usual."""
     units = {part.unit for part in chain.from_iterable(parts.values())}
@@ -269,7 +306,11 @@ def _in_metres(
     if unit is None and file_units:
         check_size(assembly)
         others = f"; {found_unit} for the other files, found by size" if without_unit else ""
-        return assembly, f"unit: {listed}, as the files state it{others}: {assembly.sizes_text}", True
+        return (
+            assembly,
+            f"unit: {listed}, as the files state it{others}: {assembly.sizes_text}",
+            True,
+        )
     size = assembly.size
     length = description.reach
     sizes = f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
@@ -281,12 +322,16 @@ def _in_metres(
     return assembly, f"unit: {unit}, as stated{override}: {sizes}", is_usual
 
 
-def _link_note(link: int, parts: Sequence[CadPart], mesh: TriangleMesh, body: LinkBody | None) -> str:
+def _link_note(
+    link: int, parts: Sequence[CadPart], mesh: TriangleMesh, body: LinkBody | None
+) -> str:
     note = f"link {link}: {', '.join(part.name for part in parts)}, {len(mesh.faces)} triangles"
     original = sum(len(part.mesh.faces) for part in parts)
     if original > len(mesh.faces):
         note += f" of {original}"
-    return note if body is None else f"{note}, {body.properties.mass:.6g} kg; {'; '.join(body.notes)}"
+    return (
+        note if body is None else f"{note}, {body.properties.mass:.6g} kg; {'; '.join(body.notes)}"
+    )
 
 
 def _mesh_path(link: int) -> str:
@@ -294,14 +339,18 @@ def _mesh_path(link: int) -> str:
 
 
 def _with_parts(
-    description: Description, meshes: Mapping[int, TriangleMesh], link_bodies: Mapping[int, LinkBody | None]
+    description: Description,
+    meshes: Mapping[int, TriangleMesh],
+    link_bodies: Mapping[int, LinkBody | None],
 ) -> Description:
     """Return the description with new shapes and bodies; the table keeps its expressions."""
     shapes = {i: (Shape(Mesh(_mesh_path(i)), color=mesh.colour),) for i, mesh in meshes.items()}
     bodies = {i: body.properties.body() for i, body in link_bodies.items() if body is not None}
 
     def with_part(i: int, joint: Joint) -> Joint:
-        replaced = {key for key, links in (("shape", shapes.keys()), ("body", bodies.keys())) if i in links}
+        replaced = {
+            key for key, links in (("shape", shapes.keys()), ("body", bodies.keys())) if i in links
+        }
         return replace(
             joint,
             shapes=shapes.get(i, joint.shapes),
@@ -315,7 +364,11 @@ def _with_parts(
     source = f"Shapes of links {_link_list(shapes)}"
     if bodies:
         source += f" and bodies of links {_link_list(bodies)}"
-    notes = "\n".join(text for text in (description.notes, f"{source} are from CAD parts (dhkit import-cad).") if text)
+    notes = "\n".join(
+        text
+        for text in (description.notes, f"{source} are from CAD parts (dhkit import-cad).")
+        if text
+    )
     return replace(description, joints=joints, base=base, notes=notes)
 
 

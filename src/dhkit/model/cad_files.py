@@ -18,7 +18,9 @@ LEFT_OUT = -1
 _MAX_LISTED_NAMES = 12
 """Largest number of names that a message lists."""
 _BASE = re.compile(r"(?<![a-z])(base|pedestal|foot|fixed)(?![a-z])", re.IGNORECASE)
-_NUMBERED_LINK = re.compile(r"(?:link|part|body|segment|teil)[ _.\-]*(\d{1,3})(?!\d)", re.IGNORECASE)
+_NUMBERED_LINK = re.compile(
+    r"(?:link|part|body|segment|teil)[ _.\-]*(\d{1,3})(?!\d)", re.IGNORECASE
+)
 _NUMBER = re.compile(r"(?<!\d)\d{1,3}(?!\d)")
 _INSTANCE = re.compile(r"-\d+$")
 """Number of an instance of a part in SolidWorks: "Assem1 - Part2-1" is the first instance of Part2."""
@@ -106,7 +108,12 @@ def link_number(name: str) -> int | None:
 
 
 def assign_parts(
-    names: Sequence[str], links: int, stated: Mapping[int, Sequence[str]] | None, where: str, *, suffixes: bool = True
+    names: Sequence[str],
+    links: int,
+    stated: Mapping[int, Sequence[str]] | None,
+    where: str,
+    *,
+    suffixes: bool = True,
 ) -> Assignment:
     """Return the parts of each link, 0 to ``links``.
 
@@ -137,7 +144,11 @@ def assign_parts(
     left_out = tuple(stated.pop(LEFT_OUT, ()))
     names = [name for name in names if name not in left_out]
     mapped = set(chain.from_iterable(stated.values()))
-    numbers = {name: link_number(Path(name).stem if suffixes else name) for name in names if name not in mapped}
+    numbers = {
+        name: link_number(Path(name).stem if suffixes else name)
+        for name in names
+        if name not in mapped
+    }
     first = names[0] if names else "forearm.stl"
     names_found = f"; found {_name_list(names)}; "
     hint = f'{names_found}say which by a mapping, such as --map "3={first}", or --map "-={first}" for a part of no link'
@@ -174,17 +185,25 @@ def assign_parts(
         note += "; no base part"
     if left_out:
         note += f"; left out: {_name_list(left_out)}"
-    return Assignment({number: several for number, several in sorted(parts.items()) if several}, note)
+    return Assignment(
+        {number: several for number, several in sorted(parts.items()) if several}, note
+    )
 
 
-def _check_stated(stated: Mapping[int, Sequence[str]], names: Sequence[str], links: int, where: str) -> None:
+def _check_stated(
+    stated: Mapping[int, Sequence[str]], names: Sequence[str], links: int, where: str
+) -> None:
     seen: set[str] = set()
     for number, several in stated.items():
         if number != LEFT_OUT and not 0 <= number <= links:
-            raise ModelError(f"{where}: the mapping names link {number}; the table has links 0 to {links}")
+            raise ModelError(
+                f"{where}: the mapping names link {number}; the table has links 0 to {links}"
+            )
         for name in several:
             if name not in names:
-                raise ModelError(f"{where}: the mapping names {name[:80]!r}; found {_name_list(names)}")
+                raise ModelError(
+                    f"{where}: the mapping names {name[:80]!r}; found {_name_list(names)}"
+                )
             if name in seen:
                 raise ModelError(f"{where}: the mapping names {name[:80]!r} twice")
             seen.add(name)

@@ -50,7 +50,11 @@ class StatedMasses:
 
     @classmethod
     def of(
-        cls, links: int, density: float | None, masses: Mapping[int, float] | None, reports: Sequence[Path]
+        cls,
+        links: int,
+        density: float | None,
+        masses: Mapping[int, float] | None,
+        reports: Sequence[Path],
     ) -> StatedMasses:
         """Read reports, and check everything against the number of joints.
 
@@ -60,16 +64,23 @@ class StatedMasses:
             A number that is not positive, a link that does not exist, stated twice, or a report of no known link.
         """
         masses = dict(masses or {})
-        for what, value in (("density", density), *((f"mass of link {i}", mass) for i, mass in masses.items())):
+        for what, value in (
+            ("density", density),
+            *((f"mass of link {i}", mass) for i, mass in masses.items()),
+        ):
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise ModelError(f"{what} is {value:g}; expected a positive number")
         reported: dict[int, ReportedMass] = {}
         for part in chain.from_iterable(map(read_mass_report, reports)):
             number = link_number(part.part)
             if number is None:
-                raise ModelError(f"{part.source}: part {part.part[:60]!r} has no link number; expected such as link3")
+                raise ModelError(
+                    f"{part.source}: part {part.part[:60]!r} has no link number; expected such as link3"
+                )
             if number in reported:
-                raise ModelError(f"{part.source}: link {number} is reported twice, in {reported[number].source} too")
+                raise ModelError(
+                    f"{part.source}: link {number} is reported twice, in {reported[number].source} too"
+                )
             reported[number] = part
         for number in (*masses, *reported):
             if not 0 <= number <= links:
@@ -85,10 +96,16 @@ class StatedMasses:
         """A warning about a density that no material of arms has."""
         if self.density is None or _USUAL_DENSITIES[0] <= self.density <= _USUAL_DENSITIES[1]:
             return ()
-        hint = "g/cm^3 meant? then times 1000" if self.density < _USUAL_DENSITIES[0] else "steel has 7850"
+        hint = (
+            "g/cm^3 meant? then times 1000"
+            if self.density < _USUAL_DENSITIES[0]
+            else "steel has 7850"
+        )
         return (f"warning: the density is {self.density:g} kg/m^3; {hint}",)
 
-    def body(self, link: int, meshes: Sequence[TriangleMesh], T_frame_world: Array) -> LinkBody | None:
+    def body(
+        self, link: int, meshes: Sequence[TriangleMesh], T_frame_world: Array
+    ) -> LinkBody | None:
         """Return the body of a link, None if nothing is stated about it.
 
         Parameters
@@ -118,13 +135,17 @@ class StatedMasses:
         if density is None:
             raise ModelError(f"link {link}: neither a density nor a mass")
         size = max(mesh.size for mesh in meshes)
-        properties = MassProperties(density * unit_body.mass, unit_body.com, density * unit_body.inertia)
+        properties = MassProperties(
+            density * unit_body.mass, unit_body.com, density * unit_body.inertia
+        )
         basis = f"{density:.6g} kg/m^3" if stated is None else f"{stated:.6g} kg"
         notes = (f"body from {unit_body.method.value} and {basis}", *unit_body.notes)
         return LinkBody(_without_rounding(properties, size), notes)
 
 
-def _reported_body(report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame_world: Array) -> LinkBody:
+def _reported_body(
+    report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame_world: Array
+) -> LinkBody:
     """Return the body of a report in a link's DH frame, with warnings about unlikely numbers."""
     body = report.properties.moved(T_frame_world)
     notes = [f"body from the report of {report.part[:60]!r}, {report.source}", *report.notes]
@@ -159,4 +180,6 @@ def _without_rounding(body: MassProperties, size: float) -> MassProperties:
     """Return mass properties with 0 for coordinates and products that are rounding errors: people read the file."""
     com = np.where(np.abs(body.com) < _INTEGRATION_ERROR * size, 0.0, body.com)
     is_rounding = np.abs(body.inertia) < _INTEGRATION_ERROR * np.trace(body.inertia)
-    return MassProperties(body.mass, com, np.where(is_rounding & ~np.eye(3, dtype=bool), 0.0, body.inertia))
+    return MassProperties(
+        body.mass, com, np.where(is_rounding & ~np.eye(3, dtype=bool), 0.0, body.inertia)
+    )

@@ -44,7 +44,11 @@ class CadPart:
 
 
 def cad_parts(
-    folder: Path, links: int, *, files: Mapping[int, Sequence[str]] | None = None, simplify: int | None = None
+    folder: Path,
+    links: int,
+    *,
+    files: Mapping[int, Sequence[str]] | None = None,
+    simplify: int | None = None,
 ) -> tuple[dict[int, tuple[CadPart, ...]], str]:
     """Read the parts of an assembly.
 
@@ -71,7 +75,9 @@ def cad_parts(
         many triangles, judged by its header.
     """
     if simplify is not None and simplify < _MIN_TRIANGLES:
-        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {_MIN_TRIANGLES} at least")
+        raise ModelError(
+            f"simplify is {simplify}; expected the number of triangles to keep, {_MIN_TRIANGLES} at least"
+        )
     is_mat = folder.suffix.lower() == ".mat" and not folder.is_dir()
     mat = folder if is_mat else mat_file(folder)
     if mat is not None:
@@ -83,7 +89,9 @@ def cad_parts(
     else:
         names = mesh_file_names(folder)
         if not names:
-            raise ModelError(f"{folder}: no mesh files; expected .stl, .obj, .ply or .dae files, or one .mat file")
+            raise ModelError(
+                f"{folder}: no mesh files; expected .stl, .obj, .ply or .dae files, or one .mat file"
+            )
         assignment = assign_parts(names, links, files, str(folder))
         assigned = chain.from_iterable(assignment.parts.values())
         paths = {name: file_inside(folder, name) for name in assigned}
@@ -117,7 +125,9 @@ def _read_part(name: str, path: Path, max_triangles: int) -> CadPart:
     if (duration := time.perf_counter() - started) > 1:
         log.info("read %s: %d triangles, %.1f s", path.name, len(mesh.faces), duration)
     # Of all formats only COLLADA states its unit.
-    return CadPart(name, mesh, collada_unit(path.read_bytes()) if path.suffix.lower() == ".dae" else None)
+    return CadPart(
+        name, mesh, collada_unit(path.read_bytes()) if path.suffix.lower() == ".dae" else None
+    )
 
 
 def simplified(mesh: TriangleMesh, count: int, name: str) -> TriangleMesh:
@@ -133,18 +143,31 @@ def simplified(mesh: TriangleMesh, count: int, name: str) -> TriangleMesh:
     try:
         import fast_simplification
     except ImportError as error:
-        raise ModelError(f"simplifying needs fast-simplification ({error}); pip install fast-simplification") from None
+        raise ModelError(
+            f"simplifying needs fast-simplification ({error}); pip install fast-simplification"
+        ) from None
     started = time.perf_counter()
     log.info("simplifying %s: %d triangles to %d ...", name, len(mesh.faces), count)
     # Relative to the mesh's size: collapses are ordered by distances in single precision.
     size = mesh.size or 1.0
     middle = mesh.bounds.mean(axis=0)
     points = ((mesh.vertices - middle) / size).astype(np.float32)
-    vertices, faces = fast_simplification.simplify(points, mesh.faces.astype(np.int32), target_count=count)
-    reduced = TriangleMesh(np.asarray(vertices, dtype=np.float64) * size + middle, np.asarray(faces, dtype=np.intp))
+    vertices, faces = fast_simplification.simplify(
+        points, mesh.faces.astype(np.int32), target_count=count
+    )
+    reduced = TriangleMesh(
+        np.asarray(vertices, dtype=np.float64) * size + middle, np.asarray(faces, dtype=np.intp)
+    )
     if not len(reduced.faces) or not np.isfinite(reduced.vertices).all():
-        raise ModelError(f"{name}: nothing is left of {len(mesh.faces)} triangles reduced to {count}")
-    log.info("simplified %s: %d triangles, %.1f s", name, len(reduced.faces), time.perf_counter() - started)
+        raise ModelError(
+            f"{name}: nothing is left of {len(mesh.faces)} triangles reduced to {count}"
+        )
+    log.info(
+        "simplified %s: %d triangles, %.1f s",
+        name,
+        len(reduced.faces),
+        time.perf_counter() - started,
+    )
     if mesh.colours is None:
         return reduced
     mean = np.round(mesh.colours.mean(axis=0)).astype(np.uint8)

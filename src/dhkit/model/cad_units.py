@@ -106,7 +106,11 @@ def check_positions(parts: Mapping[str, TriangleMesh], where: str) -> None:
     ModelError
         All parts but one, and two at least, have their own lowest corner at the origin.
     """
-    moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= _CORNER_TOLERANCE * part.size]
+    moved = [
+        name
+        for name, part in parts.items()
+        if np.abs(part.bounds[0]).max() <= _CORNER_TOLERANCE * part.size
+    ]
     if len(moved) >= max(2, len(parts) - 1):
         raise ModelError(
             f"{where}: {len(moved)} of {len(parts)} parts have their own corner at the origin: each was moved into "
@@ -130,14 +134,22 @@ def unit_of(assembly: Assembly) -> str:
     length = assembly.arm_length
     size = assembly.size
     if length == 0:
-        raise ModelError(f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm")
-    fitting = [unit for unit, metres in UNITS.items() if _SIZE_RANGE[0] <= size * metres / length <= _SIZE_RANGE[1]]
+        raise ModelError(
+            f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm"
+        )
+    fitting = [
+        unit
+        for unit, metres in UNITS.items()
+        if _SIZE_RANGE[0] <= size * metres / length <= _SIZE_RANGE[1]
+    ]
     sizes = f"the assembly is {size:.4g} across, the arm of the table {length:.4g} m long"
     if len(fitting) == 1:
         _check_other_units(assembly, fitting[0], f"{where}: {sizes}")
         return fitting[0]
     if not fitting:
-        raise ModelError(f"{where}: {sizes}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
+        raise ModelError(
+            f"{where}: {sizes}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit"
+        )
     distances = {unit: assembly.mean_axis_distance(UNITS[unit]) / length for unit in fitting}
     best, second = sorted(distances, key=distances.__getitem__)[:2]
     if distances[best] > _MAX_MEAN_AXIS_DISTANCE:
@@ -147,7 +159,9 @@ def unit_of(assembly: Assembly) -> str:
         )
     clear_distance = _MIN_DISTANCE_RATIO * distances[best] + _MAX_MEAN_AXIS_DISTANCE / 5
     if assembly.description.n < _MIN_DECISIVE_AXES or distances[second] < clear_distance:
-        raise ModelError(f"{where}: {sizes}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
+        raise ModelError(
+            f"{where}: {sizes}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}"
+        )
     return best
 
 
@@ -159,10 +173,15 @@ def _check_other_units(assembly: Assembly, unit: str, sizes: str) -> None:
     length = assembly.arm_length
     size = assembly.size
     allowed = _MAX_MEAN_AXIS_DISTANCE * length
-    if assembly.description.n < _MIN_DECISIVE_AXES or assembly.mean_axis_distance(UNITS[unit]) <= allowed:
+    if (
+        assembly.description.n < _MIN_DECISIVE_AXES
+        or assembly.mean_axis_distance(UNITS[unit]) <= allowed
+    ):
         return
     low, high = _WIDE_SIZE_RANGE
-    possible = [other for other in UNITS if other != unit and low <= size * UNITS[other] / length <= high]
+    possible = [
+        other for other in UNITS if other != unit and low <= size * UNITS[other] / length <= high
+    ]
     others = [other for other in possible if assembly.mean_axis_distance(UNITS[other]) <= allowed]
     if others:
         raise ModelError(

@@ -52,7 +52,9 @@ def repaired(mesh: TriangleMesh) -> Surface:
         return _closed_surface(merged)
     near = _merged_nearby(mesh)
     if is_closed(near):
-        return _closed_surface(near, f"vertices nearer than {_MERGE_DISTANCE:g} of the size were joined")
+        return _closed_surface(
+            near, f"vertices nearer than {_MERGE_DISTANCE:g} of the size were joined"
+        )
     for with_orientation in (True, False):
         fewer, notes = _without_duplicates(merged, with_orientation=with_orientation)
         if notes and is_closed(fewer := _consistently_oriented(fewer)[0]):
@@ -64,7 +66,11 @@ def repaired(mesh: TriangleMesh) -> Surface:
     if is_closed(oriented):
         return Surface(oriented, is_closed=True, notes=notes)
     # Triangles that are written twice may be the wall between two bodies: without them, both would be open.
-    for candidate, changes in ((oriented, notes), (merged, ()), (_consistently_oriented(merged)[0], ())):
+    for candidate, changes in (
+        (oriented, notes),
+        (merged, ()),
+        (_consistently_oriented(merged)[0], ()),
+    ):
         capped, share = _capped(candidate)
         if is_closed(capped):
             caps = f"open: holes were capped, {100 * share:.2g} % of the area"
@@ -84,7 +90,9 @@ def _closed_surface(mesh: TriangleMesh, *notes: str) -> Surface:
     return Surface(mesh, is_closed=True, notes=notes)
 
 
-def _without_duplicates(mesh: TriangleMesh, *, with_orientation: bool) -> tuple[TriangleMesh, tuple[str, ...]]:
+def _without_duplicates(
+    mesh: TriangleMesh, *, with_orientation: bool
+) -> tuple[TriangleMesh, tuple[str, ...]]:
     """Return a mesh with one triangle for each set of vertices, or for each set and orientation, and a note."""
     if with_orientation:
         # A cyclic shift puts the smallest vertex first and keeps the orientation.
@@ -139,7 +147,9 @@ def tetrahedra(a: Array, b: Array, c: Array) -> Array:
     ax, ay, az = a.T
     bx, by, bz = b.T
     cx, cy, cz = c.T
-    volumes: Array = (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6
+    volumes: Array = (
+        ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    ) / 6
     return volumes
 
 
@@ -153,7 +163,9 @@ def _merged_nearby(mesh: TriangleMesh) -> TriangleMesh:
     if step == 0:
         return mesh
     origin = mesh.bounds[0]
-    merged = TriangleMesh(np.round((mesh.vertices - origin) / step), mesh.faces, mesh.colours).merged()
+    merged = TriangleMesh(
+        np.round((mesh.vertices - origin) / step), mesh.faces, mesh.colours
+    ).merged()
     return TriangleMesh(merged.vertices * step + origin, merged.faces, merged.colours)
 
 
@@ -182,7 +194,9 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     f = first % m
     g = second % m
     labels = component_labels(
-        np.concatenate([f, f + m]), np.concatenate([g + is_alike * m, g + (1 - is_alike) * m]), 2 * m
+        np.concatenate([f, f + m]),
+        np.concatenate([g + is_alike * m, g + (1 - is_alike) * m]),
+        2 * m,
     )
     kept = labels[:m]
     turned = labels[m:]
@@ -206,7 +220,9 @@ def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     reversed_keys = (keys % count) * count + keys // count
     places = np.minimum(np.searchsorted(keys, reversed_keys), len(keys) - 1)
     missing = times - np.where(keys[places] == reversed_keys, times[places], 0)
-    rim = np.repeat(keys, np.maximum(missing, 0))  # edges that are passed more often than their reversed ones
+    rim = np.repeat(
+        keys, np.maximum(missing, 0)
+    )  # edges that are passed more often than their reversed ones
     start = rim // count
     end = rim % count
 
@@ -215,10 +231,16 @@ def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     holes, hole = np.unique(labels[start], return_inverse=True)
     sizes = np.bincount(hole, minlength=len(holes))
     middles = np.stack(
-        [np.bincount(hole, mesh.vertices[start, k], minlength=len(holes)) / sizes for k in range(3)], axis=1
+        [
+            np.bincount(hole, mesh.vertices[start, k], minlength=len(holes)) / sizes
+            for k in range(3)
+        ],
+        axis=1,
     )
     fans = np.stack([end, start, count + hole], axis=1)
-    filled = TriangleMesh(np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, fans]))
+    filled = TriangleMesh(
+        np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, fans])
+    )
     area = np.linalg.norm(area_vectors(filled.corners), axis=1)
     share = float(area[len(mesh.faces) :].sum() / max(area.sum(), np.finfo(float).tiny))
     return (filled, share) if share <= _MAX_CAP_AREA else (mesh, share)
@@ -235,7 +257,10 @@ def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
         is_doubled = _has_crowded_edges(mesh) and shells.doubled()
         return mesh, (*inversion, *([_DOUBLED] if is_doubled else []))
     if shells.count > BOUNDS.shells:
-        return mesh, (*inversion, f"{shells.count} shells: which of them lie in others was not looked at")
+        return mesh, (
+            *inversion,
+            f"{shells.count} shells: which of them lie in others was not looked at",
+        )
     # The shells around a cavity have a winding number of 1; any other shell of negative volume is inside out.
     shells.turn(shells.inside_out())
     flipped = shells.flipped ^ is_inverted
@@ -243,13 +268,18 @@ def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     if flipped.all():
         notes.append(_INVERTED)
     elif flipped.any():
-        notes.append(f"{int(flipped.sum())} of {shells.count} shells were inside out and were turned")
+        notes.append(
+            f"{int(flipped.sum())} of {shells.count} shells were inside out and were turned"
+        )
     return shells.mesh, (*notes, *_shell_notes(shells))
 
 
 def _has_crowded_edges(mesh: TriangleMesh) -> bool:
     """Whether an edge belongs to more than two triangles."""
-    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    edges = np.sort(
+        np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]),
+        axis=1,
+    )
     keys = np.sort(edges[:, 0].astype(np.int64) * len(mesh.vertices) + edges[:, 1])
     return bool((keys[2:] == keys[:-2]).any())
 
@@ -263,8 +293,12 @@ def _shell_notes(shells: Shells) -> list[str]:
     share = f" ({100 * twice / float(shells.volume.sum()):.2g} % of the volume)" if twice else ""
     if doubled or twice:
         which = f"{doubled} of {shells.count}" if doubled else "some"
-        notes.append(f"warning: {which} shells lie in or reach into others, where the material counts twice{share}")
+        notes.append(
+            f"warning: {which} shells lie in or reach into others, where the material counts twice{share}"
+        )
     if reaching:
         which = "a cavity reaches" if reaching == 1 else f"{reaching} cavities reach"
-        notes.append(f"warning: {which} out of the material around, and takes volume away where there is none")
+        notes.append(
+            f"warning: {which} out of the material around, and takes volume away where there is none"
+        )
     return notes

@@ -59,7 +59,9 @@ class _Document:
 
     def __init__(self, content: bytes) -> None:
         self.root = _without_namespaces(content)
-        self.by_id = {element.get("id", ""): element for element in self.root.iter() if element.get("id")}
+        self.by_id = {
+            element.get("id", ""): element for element in self.root.iter() if element.get("id")
+        }
         self.geometries: dict[str, list[tuple[str, TriangleMesh]]] = {}
         self.pieces = 0
 
@@ -75,7 +77,11 @@ class _Document:
 
     def mesh(self) -> TriangleMesh:
         instance = self.root.find("scene/instance_visual_scene")
-        scene = self._named(instance) if instance is not None else self.root.find("library_visual_scenes/visual_scene")
+        scene = (
+            self._named(instance)
+            if instance is not None
+            else self.root.find("library_visual_scenes/visual_scene")
+        )
         pieces: list[TriangleMesh] = []
         if scene is not None:
             for node in scene.findall("node"):
@@ -99,7 +105,9 @@ class _Document:
         url = element.get("url") or element.get("source") or ""
         named = self.by_id.get(url.removeprefix("#"))
         if not url.startswith("#") or named is None:
-            raise ModelError(f"<{element.tag}> names {url[:60]!r}; expected an element of this file")
+            raise ModelError(
+                f"<{element.tag}> names {url[:60]!r}; expected an element of this file"
+            )
         return named
 
     def _node(self, node: _Element, T: Array, depth: int) -> Iterator[TriangleMesh]:
@@ -118,7 +126,9 @@ class _Document:
                 placed = mesh.turned() if np.linalg.det(linear) < 0 else mesh
                 colour = colours.get(symbol)
                 face_colours = None if colour is None else np.tile(colour, (len(mesh.faces), 1))
-                yield TriangleMesh(placed.vertices @ linear.T + T[:3, 3], placed.faces, face_colours)
+                yield TriangleMesh(
+                    placed.vertices @ linear.T + T[:3, 3], placed.faces, face_colours
+                )
         for child in (*node.findall("node"), *map(self._named, node.findall("instance_node"))):
             yield from self._node(child, T, depth + 1)
 
@@ -128,8 +138,14 @@ class _Document:
         for bound in instance.iter("instance_material"):
             material = self._named_or_none(bound, "target")
             instance_effect = None if material is None else material.find("instance_effect")
-            effect = None if instance_effect is None else self._named_or_none(instance_effect, "url")
-            color = None if effect is None else next((e.find("color") for e in effect.iter("diffuse")), None)
+            effect = (
+                None if instance_effect is None else self._named_or_none(instance_effect, "url")
+            )
+            color = (
+                None
+                if effect is None
+                else next((e.find("color") for e in effect.iter("diffuse")), None)
+            )
             if color is not None and color.text:
                 rgb = np.clip(_numbers(color.text)[:3], 0, 1)
                 colours[bound.get("symbol", "")] = np.round(255 * rgb).astype(np.uint8)
@@ -143,8 +159,14 @@ class _Document:
         key = geometry.get("id", "")
         if key not in self.geometries:
             mesh = geometry.find("mesh")
-            elements = [] if mesh is None else [element for element in mesh if element.tag in _POLYGON_TAGS]
-            self.geometries[key] = [(element.get("material", ""), self._polygons(element)) for element in elements]
+            elements = (
+                []
+                if mesh is None
+                else [element for element in mesh if element.tag in _POLYGON_TAGS]
+            )
+            self.geometries[key] = [
+                (element.get("material", ""), self._polygons(element)) for element in elements
+            ]
         return self.geometries[key]
 
     def _polygons(self, element: _Element) -> TriangleMesh:
@@ -157,7 +179,9 @@ class _Document:
         vertices = self._positions(self._named(inputs["VERTEX"]))
         corners, counts = _corners(element, stride, offset)
         if len(corners) and (corners.min() < 0 or corners.max() >= len(vertices)):
-            raise ModelError(f"a face with vertex {corners.max()}; the file has vertices 0 to {len(vertices) - 1}")
+            raise ModelError(
+                f"a face with vertex {corners.max()}; the file has vertices 0 to {len(vertices) - 1}"
+            )
         return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 
     def _positions(self, vertices: _Element) -> Array:
@@ -170,7 +194,9 @@ class _Document:
         stride = 3 if accessor is None else _whole_number(accessor.get("stride", "3"))
         numbers = _numbers(source.findtext("float_array") or "")
         if stride < 3 or len(numbers) % stride:
-            raise ModelError(f"{len(numbers)} coordinates with a stride of {stride}; expected whole points")
+            raise ModelError(
+                f"{len(numbers)} coordinates with a stride of {stride}; expected whole points"
+            )
         return numbers.reshape(-1, stride)[:, :3]
 
 
@@ -186,7 +212,9 @@ def _without_namespaces(content: bytes) -> _Element:
     return root
 
 
-def _corners(element: _Element, stride: int, offset: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _corners(
+    element: _Element, stride: int, offset: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the vertex indices of an element's polygons, one after the other, and how many each polygon has."""
     lists = [_numbers(p.text or "").astype(np.intp) for p in element.findall("p")]
     if any(len(p) % stride for p in lists):
@@ -200,7 +228,9 @@ def _corners(element: _Element, stride: int, offset: int) -> tuple[NDArray[np.in
         counts = np.full(sum(len(p) for p in corners) // 3, 3, dtype=np.intp)
     indices = np.concatenate([np.zeros(0, dtype=np.intp), *corners])
     if len(indices) != counts.sum() or (counts < 0).any():
-        raise ModelError(f"<{element.tag}> with {len(indices)} corners; its counts say {counts.sum()}")
+        raise ModelError(
+            f"<{element.tag}> with {len(indices)} corners; its counts say {counts.sum()}"
+        )
     return indices, counts
 
 

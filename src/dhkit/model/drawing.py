@@ -3,13 +3,15 @@
 A link goes from its own joint's axis to the next: by d along the first, then by a along the common normal of the two.
 These are drawn as a column and a tube. On the next axis the link has a drum, in which the next link turns on a slimmer,
 longer hub. A prismatic joint is a square bar of the stroke's length in a block. Sizes are relative to the arm's reach.
+A rod that carries a coaxial joint, such as a SCARA's quill, leaves its block on one side, and the block stands where
+this joint never comes: its link is drawn beside the common normal, at the block's height.
 Where nearly parallel axes make a and d no sizes of the arm, links are tubes between balls at the joints' centres.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -43,6 +45,15 @@ _BLOCK_HALF_LENGTH = 1.3
 """Half the length of a slider's block, relative to its half width."""
 _BAR_HALF_WIDTH = 0.55
 """Half width of a slider's bar, relative to the block's."""
+_HEAD_GAP = 1.25
+"""Smallest distance of a block from the end of its rod, relative to the extent of the solids at that end."""
+_ROD_HOLD = 0.25
+"""Length of such a rod in its block at the far end of the stroke, relative to half the block's length: a longer rod
+would reach further into the arm at the near end."""
+_MAX_PAST = 0.25
+"""Largest length of a stroke beyond the link before for which a block is moved, relative to the reach."""
+_HEAD_OFFSET = 2.0
+"""Smallest length of the common normal for which a block is moved, relative to the block's half width."""
 _STOP_HALF_WIDTH = 0.8
 """Half width of the stops at a rail's ends, relative to the block's."""
 _PLATE_RADIUS = 1.8
@@ -53,6 +64,8 @@ _THICKNESS = 0.25
 """Thickness of plates and stops, relative to the radius of the drum or the half width of the block."""
 _GRIPPER_START = 1.25
 """Distance at which the gripper begins on an arm that ends in its last drum, relative to the joint's extent."""
+_GRIPPER_LENGTH = 1.9
+"""Length of the gripper, relative to the radius of the last joint."""
 _MIN_NECK_LENGTH = 1e-3
 """Shortest neck that is drawn, relative to its radius."""
 
@@ -76,6 +89,23 @@ class _Link:
     """Shape (4, 4): z along the link's own joint axis, x along the common normal."""
     T_end: Array
     """Shape (4, 4): z along the next joint's axis, the same x."""
+    rise: float = 0.0
+    """Height along the next joint's axis at which the tube along the common normal is drawn, m."""
+
+    @property
+    def T_tube(self) -> Array:
+        """The corner, moved to the tube's height along the next joint's axis, shape (4, 4)."""
+        return _at(self.rise * self.T_end[:3, 2]) @ self.T_corner
+
+    @property
+    def column(self) -> float:
+        """The height along the link's own joint axis to which it is drawn, m.
+
+        Parallel axes have z_corner . z_end = +1 or -1, and the rise lengthens or shortens the column.
+        """
+        if not self.is_parallel:
+            return self.d
+        return self.d + self.rise * float(self.T_corner[:3, 2] @ self.T_end[:3, 2])
 
     @property
     def is_parallel(self) -> bool:
@@ -104,11 +134,10 @@ class _Joint:
     """A slider's angle about its axis, rad."""
     is_rod: bool = False
     """Whether the slider's bar moves, in a block of the link before; otherwise the block moves, on a rail."""
-
-    @property
-    def near(self) -> float:
-        """The height in a slider's stroke nearest to the link before; 0 if the stroke goes past it."""
-        return float(np.clip(0.0, *self.stroke))
+    head: tuple[float, float] = (0.0, 0.0)
+    """Lowest and highest height of the block around a rod."""
+    rod: tuple[float, float] = (0.0, 0.0)
+    """Ends of a rod along the axis, from the corner of the link after it."""
 
     @property
     def extent(self) -> float:
@@ -127,9 +156,13 @@ def _links(description: Description) -> list[_Link]:
     # modified link at its corner, with its end at Tx(a) Rx(alpha).
     if description.convention is Convention.STANDARD:
         return [
-            _Link(x, a, _normal_pose(-a, c, -s), _IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
+            _Link(x, a, _normal_pose(-a, c, -s), _IDENTITY)
+            for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
         ]
-    return [_Link(x, a, _IDENTITY, _normal_pose(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
+    return [
+        _Link(x, a, _IDENTITY, _normal_pose(a, c, s))
+        for x, (a, c, s) in zip(d, [*rows, straight], strict=True)
+    ]
 
 
 def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
@@ -147,7 +180,9 @@ def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
         if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
             radius = min(radius, _NESTED_RADIUS * joints[-1].radius)
             half = max(half, _NESTED_HALF_HEIGHT * joints[-1].extent / _HUB_HALF_LENGTH)
-        if not joints and abs(after.d) > radius:  # frame 0 is on the floor: the drum stands on it, not in it
+        if (
+            not joints and abs(after.d) > radius
+        ):  # frame 0 is on the floor: the drum stands on it, not in it
             half = min(half, _MAX_FIRST_DRUM_HALF * abs(after.d))
             lift = float(np.copysign(_HUB_HALF_LENGTH * half, after.d))
         if not prismatic:
@@ -155,9 +190,73 @@ def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
             continue
         low, high = np.clip((numbers.lower[i], numbers.upper[i]), -scale, scale) + after.d
         # A straight next link would lie inside a rail, so its bar moves instead, unless it would move through a base.
-        is_rod = after.is_straight(radius) and not all(link.is_straight(radius) for link in links[: i + 1])
-        joints.append(_Joint(True, radius, half, 0.0, (low, high), float(numbers.theta[i]), is_rod))
+        is_rod = after.is_straight(radius) and not all(
+            link.is_straight(radius) for link in links[: i + 1]
+        )
+        # The block reaches to the height in the stroke nearest to the link before; 0 if the stroke goes past it.
+        near = float(np.clip(0.0, low, high))
+        head = (min(-half, near), max(half, near))
+        rod = _bar_ends(near - high, near - low, half)
+        theta = float(numbers.theta[i])
+        joints.append(_Joint(True, radius, half, 0.0, (low, high), theta, is_rod, head, rod))
     return joints
+
+
+def _clear_heads(
+    links: list[_Link], joints: list[_Joint], T_last_tool: Array, max_past: float
+) -> None:
+    """Move the blocks of rods that carry a joint, and the links with these blocks, out of the way of that joint.
+
+    Heights are measured along the axis from the end of the link with the block, positive where the rod leaves it. The
+    rod's end moves from ``begin`` to ``far``. The solids that it carries reach back from it by ``back``, so that
+
+        front = begin - gap * back        is the block's highest front,
+        rise  = min(0, front - half)      the height of the tube that holds it, and
+        rise - half ... front             the block.
+    """
+    for i, joint in enumerate(joints[:-1]):
+        if not joint.is_rod:
+            continue
+        low, high = joint.stroke
+        side = 1.0 if high >= -low else -1.0
+        begin = min(side * low, side * high)
+        far = max(side * low, side * high)
+        front = begin - _HEAD_GAP * _extent_behind(links, joints, T_last_tool, i, side)
+        rise = min(0.0, front - joint.half)
+
+        # A stroke that goes far past the link, or begins on the axis of the joint before, really passes through it.
+        is_past = -begin > max_past
+        is_in_the_way = rise < 0 and abs(links[i].a) < _HEAD_OFFSET * joint.radius
+        if is_past or is_in_the_way:
+            continue
+
+        # At the far end of the stroke, the rod's other end is still in the block.
+        head = (side * (rise - joint.half), side * front)
+        rod = (side * (front - _ROD_HOLD * joint.half - far), 0.0)
+        joints[i] = replace(joint, head=(min(head), max(head)), rod=(min(rod), max(rod)))
+        links[i] = replace(links[i], rise=side * rise)
+
+
+def _extent_behind(
+    links: Sequence[_Link], joints: Sequence[_Joint], T_last_tool: Array, i: int, side: float
+) -> float:
+    """Return how far the solids at the end of rod i reach back towards its block, m.
+
+    They are the drums about the rod's end and, where the last of them carries it, a gripper that points back.
+    """
+    extent = 0.0
+    for after, joint in zip(links[i + 2 :], joints[i + 1 :], strict=True):
+        extent = max(extent, joint.extent)
+        if abs(after.d) + abs(after.a) > joint.extent:
+            break
+
+    # The axes of the rod and of a last joint after it coincide; the tool's z axis is z_n.
+    is_last = i + 2 == len(joints)
+    axis = links[i + 1].T_corner[:3, 2] @ links[i + 1].T_end[:3, 2]
+    axis *= links[-1].T_corner[:3, 2] @ T_last_tool[:3, 2]
+    if is_last and side * axis < 0:
+        extent = max(extent, _GRIPPER_START * extent + _GRIPPER_LENGTH * joints[-1].radius)
+    return extent
 
 
 class Drawing:
@@ -166,6 +265,12 @@ class Drawing:
     def __init__(self, description: Description) -> None:
         self.links = _links(description)
         self.joints = _joints(description, self.links)
+        _clear_heads(
+            self.links,
+            self.joints,
+            description.numbers.T_last_tool,
+            _MAX_PAST * description.reach,
+        )
         self.T_world_base = description.numbers.T_world_base
         self.T_last_tool = description.numbers.T_last_tool
         self.far_ends = description.numbers.link_ends
@@ -176,16 +281,23 @@ class Drawing:
         ends = self.joints[max(i - 1, 0) : i + 1]
         tube = _TUBE_RADIUS * min(joint.radius for joint in ends)
         if self.far_ends is not None:
-            yield from self._between(self.far_ends.begin[i], self.far_ends.end[i], ends[0].radius, tube)
+            yield from self._between(
+                self.far_ends.begin[i], self.far_ends.end[i], ends[0].radius, tube
+            )
             return
         if i:
             yield from _own_joint_solids(link, self.joints[i - 1], tube)
         elif not self.joints[0].prismatic:
             yield from self._foot()
         if link.a:
-            yield _cylinder(link.T_corner @ _ALONG_X, tube, 0.0, link.a)
-        if link.a and link.d:
-            yield Sphere(_size(tube)), link.T_corner
+            yield _cylinder(link.T_tube @ _ALONG_X, tube, 0.0, link.a)
+        # Where the column does not reach a tube beside the common normal, a post at the corner does.
+        column_rises = i > 0 and not self.joints[i - 1].prismatic and link.is_parallel
+        if link.rise and not column_rises:
+            yield _cylinder(link.T_end @ _shift(x=-link.a), tube, 0.0, link.rise)
+            yield Sphere(_size(tube)), link.T_tube
+        if link.a and (link.column if column_rises else link.d):
+            yield Sphere(_size(tube)), link.T_tube if column_rises else link.T_corner
         if i < len(self.joints):
             yield from _next_joint_solids(link, self.joints[i])
 
@@ -208,7 +320,10 @@ class Drawing:
         raised = T_world_end[2, 3] if np.isclose(up * T_world_end[2, 2], 1.0) else 0.0
         depth = max(raised, 0.0 if joint.lift else joint.extent + _POST_HEIGHT * joint.radius)
         yield _cylinder(
-            T_base_end, _PLATE_RADIUS * joint.radius, -up * depth, -up * (depth - _THICKNESS * joint.radius)
+            T_base_end,
+            _PLATE_RADIUS * joint.radius,
+            -up * depth,
+            -up * (depth - _THICKNESS * joint.radius),
         )
         if depth:
             yield _cylinder(T_base_end, joint.radius, -up * depth, joint.lift)
@@ -234,7 +349,12 @@ class Drawing:
         yield _cylinder(T, 0.9 * size, root, root + 0.3 * size)
         yield _box(T, (1.05 * size, 0.45 * size), root + 0.3 * size, root + 0.7 * size)
         for side in (-0.85, 0.85):
-            yield _box(T @ _shift(x=side * size), (0.2 * size, 0.4 * size), root + 0.7 * size, root + 1.9 * size)
+            yield _box(
+                T @ _shift(x=side * size),
+                (0.2 * size, 0.4 * size),
+                root + 0.7 * size,
+                root + _GRIPPER_LENGTH * size,
+            )
 
     def _gripper_place(self) -> tuple[Array, float]:
         """Return the gripper's pose, z forwards, and the distance at which it begins, m.
@@ -263,18 +383,13 @@ def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid
         T_start = link.T_corner @ _shift(z=-link.d)
         half = _HUB_HALF_LENGTH * joint.half
         yield _cylinder(T_start, _HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
-        if link.d:
-            yield _cylinder(T_start, tube, 0.0, link.d)
+        if link.column:
+            yield _cylinder(T_start, tube, 0.0, link.column)
         return
     T = link.T_corner @ _about_z(-joint.theta)
-    low, high = joint.stroke
     wide = joint.radius
     if joint.is_rod:
-        yield _box(
-            T,
-            (_BAR_HALF_WIDTH * wide, _BAR_HALF_WIDTH * wide),
-            *_bar_ends(joint.near - high, joint.near - low, joint.half),
-        )
+        yield _box(T, (_BAR_HALF_WIDTH * wide, _BAR_HALF_WIDTH * wide), *joint.rod)
     else:
         yield _box(T, (wide, wide), -joint.half, joint.half)
 
@@ -286,12 +401,16 @@ def _next_joint_solids(link: _Link, joint: _Joint) -> Iterator[Solid]:
     if not joint.prismatic:
         yield _cylinder(T, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
     elif joint.is_rod:
-        yield _box(T, (wide, wide), min(-joint.half, joint.near), max(joint.half, joint.near))
+        yield _box(T, (wide, wide), *joint.head)
     else:
         low, high = _bar_ends(*joint.stroke, joint.half + _THICKNESS * wide)
         yield _box(T, (_BAR_HALF_WIDTH * wide, _BAR_HALF_WIDTH * wide), low, high)
-        yield _box(T, (_STOP_HALF_WIDTH * wide, _STOP_HALF_WIDTH * wide), low, low + _THICKNESS * wide)
-        yield _box(T, (_STOP_HALF_WIDTH * wide, _STOP_HALF_WIDTH * wide), high - _THICKNESS * wide, high)
+        yield _box(
+            T, (_STOP_HALF_WIDTH * wide, _STOP_HALF_WIDTH * wide), low, low + _THICKNESS * wide
+        )
+        yield _box(
+            T, (_STOP_HALF_WIDTH * wide, _STOP_HALF_WIDTH * wide), high - _THICKNESS * wide, high
+        )
 
 
 def _bar_ends(low: float, high: float, margin: float) -> tuple[float, float]:
@@ -308,7 +427,9 @@ def _cylinder(T: Array, radius: float, start: float, end: float) -> Solid:
 
 def _box(T: Array, half: tuple[float, float], start: float, end: float) -> Solid:
     """Return a box about the z axis of T, from height start to end, m; half widths along x and y."""
-    return Box((_size(2 * half[0]), _size(2 * half[1]), _size(end - start))), T @ _shift(z=(start + end) / 2)
+    return Box((_size(2 * half[0]), _size(2 * half[1]), _size(end - start))), T @ _shift(
+        z=(start + end) / 2
+    )
 
 
 def _size(value: float) -> Expression:
@@ -318,7 +439,9 @@ def _size(value: float) -> Expression:
 
 def _normal_pose(a: float, cos_alpha: float, sin_alpha: float) -> Array:
     # Tx(a) Rx(alpha)
-    return np.array([[1, 0, 0, a], [0, cos_alpha, -sin_alpha, 0], [0, sin_alpha, cos_alpha, 0], [0, 0, 0, 1.0]])
+    return np.array(
+        [[1, 0, 0, a], [0, cos_alpha, -sin_alpha, 0], [0, sin_alpha, cos_alpha, 0], [0, 0, 0, 1.0]]
+    )
 
 
 def _shift(x: float = 0.0, z: float = 0.0) -> Array:

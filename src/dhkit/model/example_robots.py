@@ -44,7 +44,9 @@ class ExampleChain:
     joints: tuple[str, ...]
 
     def __repr__(self) -> str:
-        return repr_line(f"ExampleChain {self.name}", "", f"{counted(len(self.joints), 'joint')} to {self.tip}")
+        return repr_line(
+            f"ExampleChain {self.name}", "", f"{counted(len(self.joints), 'joint')} to {self.tip}"
+        )
 
 
 @lru_cache(maxsize=1)
@@ -59,9 +61,15 @@ def example_robots() -> dict[str, Path]:
     try:
         files = distribution(_PACKAGE).files or []
     except PackageNotFoundError:
-        raise ModelError(f"the package {_PACKAGE} is not installed; pip install {_PACKAGE} (414 MB)") from None
-    paths = sorted(Path(str(file.locate())).resolve() for file in files if file.name.endswith(".urdf"))
-    paths = [path for path in paths if b"<link" in path.read_bytes()]  # ur3.urdf is a robot without links
+        raise ModelError(
+            f"the package {_PACKAGE} is not installed; pip install {_PACKAGE} (414 MB)"
+        ) from None
+    paths = sorted(
+        Path(str(file.locate())).resolve() for file in files if file.name.endswith(".urdf")
+    )
+    paths = [
+        path for path in paths if b"<link" in path.read_bytes()
+    ]  # ur3.urdf is a robot without links
     stems = [_without_ending(path.stem) for path in paths]
     # anymal.urdf lies in the folders of two robots
     named = {
@@ -100,7 +108,9 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
         return Path(name), None, None
     source, _, links = name.rpartition("#") if "#" in name else (name, "", "")
     base, between, tip = links.partition("..")
-    path = example_urdf(source.removeprefix(_PREFIX)) if source.startswith(_PREFIX) else Path(source)
+    path = (
+        example_urdf(source.removeprefix(_PREFIX)) if source.startswith(_PREFIX) else Path(source)
+    )
     return (path, base or None, tip or None) if between else (path, None, links or None)
 
 
@@ -133,7 +143,9 @@ def _limb(tree: UrdfTree, tip: str) -> tuple[UrdfJoint, ...]:
             link = joint.parent
         return link
 
-    carriers = Counter(carrier(joint.parent) for joint in tree.joints.values() if not joint.is_fixed)
+    carriers = Counter(
+        carrier(joint.parent) for joint in tree.joints.values() if not joint.is_fixed
+    )
     chain = [joint for joint in tree.joints_to(tip) or () if not joint.is_fixed]
     branchings = [k for k, joint in enumerate(chain) if carriers[carrier(joint.parent)] > 1]
     return tuple(chain[max(branchings, default=0) :])
@@ -147,4 +159,7 @@ def _without_ending(name: str) -> str:
 
 def _robot_folder(path: Path) -> str:
     """Return the name of a robot's folder in the package: the one that holds urdf/ or robots/."""
-    return next((parent.name for parent in path.parents if parent.name.endswith(_NAME_ENDINGS)), path.parent.name)
+    return next(
+        (parent.name for parent in path.parents if parent.name.endswith(_NAME_ENDINGS)),
+        path.parent.name,
+    )

@@ -68,7 +68,9 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     path = Path(path)
     content = read_bounded(path, BOUNDS.report_bytes, "a report of mass properties", ModelError)
     try:
-        text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+        text = content.decode(
+            "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+        )
     except UnicodeDecodeError:
         raise ModelError(f"{path}: not UTF-8 text; expected a report of mass properties") from None
     if path.suffix.lower() == ".csv":
@@ -80,7 +82,9 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
         first_line = text.count("\n", 0, start) + 1
         part, properties, notes = read_solidworks_report(text[start:end], str(path), first_line)
-        reports.append(ReportedMass(part or path.stem, properties, notes, f"{path}, line {first_line}"))
+        reports.append(
+            ReportedMass(part or path.stem, properties, notes, f"{path}, line {first_line}")
+        )
     return tuple(reports)
 
 
@@ -94,13 +98,17 @@ def _table_parts(path: Path, text: str) -> tuple[ReportedMass, ...]:
         elif line.strip() and not line.lstrip().startswith("#"):
             lines.append((f"{path}, line {number}", line))
     if len(lines) < 2 or len(lines) > BOUNDS.report_rows:
-        raise ModelError(f"{path}: {len(lines)} lines; expected a heading and 1 to {BOUNDS.report_rows - 1} rows")
+        raise ModelError(
+            f"{path}: {len(lines)} lines; expected a heading and 1 to {BOUNDS.report_rows - 1} rows"
+        )
     separator = ";" if ";" in lines[0][1] else ","
     factors: Mapping[str, float] = {}
     parts = []
     for where, line in lines:
         try:
-            cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True))]
+            cells = [
+                cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True))
+            ]
         except (csv.Error, StopIteration) as error:
             raise ModelError(f"{where}: no row of a table ({error})") from None
         if factors:
@@ -128,7 +136,9 @@ def _column_factors(where: str, cells: Sequence[str]) -> dict[str, float]:
             raise ModelError(
                 f"{where}: {name} has the unit {units[name][:30]!r}; expected one of {', '.join(known)} in brackets"
             )
-    return {name: 1.0 if name == "link" else _known_units(name)[unit] for name, unit in units.items()}
+    return {
+        name: 1.0 if name == "link" else _known_units(name)[unit] for name, unit in units.items()
+    }
 
 
 def _known_units(column: str) -> Mapping[str, float]:
@@ -137,7 +147,9 @@ def _known_units(column: str) -> Mapping[str, float]:
     return UNITS if column.startswith("com") else _MOMENTS
 
 
-def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], sign: str | None) -> ReportedMass:
+def _table_part(
+    where: str, cells: Sequence[str], factors: Mapping[str, float], sign: str | None
+) -> ReportedMass:
     if len(cells) != len(factors):
         hint = "; decimal commas? write 1.5, not 1,5" if len(cells) > len(factors) else ""
         raise ModelError(f"{where}: {len(cells)} entries; expected {len(factors)}{hint}")

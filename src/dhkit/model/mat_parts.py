@@ -73,7 +73,12 @@ def _parts(variables: Mapping[str, MatVariable]) -> Iterator[tuple[str, Triangle
                 part = f"{name}{k}" if len(records) > 1 else name
                 if len(numbers) > 1:
                     part = f"{name}{number}" if len(records) == 1 else f"{part}_{number}"
-                yield part, _mesh(part, fields[f"F{number}"], fields[f"V{number}"], fields.get(f"C{number}"))
+                yield (
+                    part,
+                    _mesh(
+                        part, fields[f"F{number}"], fields[f"V{number}"], fields.get(f"C{number}")
+                    ),
+                )
 
 
 def _field_letter(match: re.Match[str]) -> str:
@@ -87,12 +92,16 @@ def _mesh(
     faces = _matrix(faces_field)
     vertices = _matrix(vertices_field)
     if faces is None or vertices is None:
-        raise ModelError(f"{part}: its {'faces' if faces is None else 'vertices'} are not a matrix of real numbers")
+        raise ModelError(
+            f"{part}: its {'faces' if faces is None else 'vertices'} are not a matrix of real numbers"
+        )
     if vertices.shape[1] not in (3, 4):
         raise ModelError(f"{part}: vertices of shape {vertices.shape}; expected (k, 3) or (k, 4)")
     points = np.array(vertices[:, :3], dtype=np.float64)
     if not 3 <= faces.shape[1] <= BOUNDS.mat_face_columns:
-        raise ModelError(f"{part}: faces of shape {faces.shape}; expected 3 to {BOUNDS.mat_face_columns} columns")
+        raise ModelError(
+            f"{part}: faces of shape {faces.shape}; expected 3 to {BOUNDS.mat_face_columns} columns"
+        )
     is_missing = np.isnan(faces)  # patch fills the rows of smaller polygons with NaN
     indices = faces[~is_missing]
     if np.any(indices != np.round(indices)) or np.any(is_missing[:, :3]):

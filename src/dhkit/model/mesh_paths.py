@@ -45,7 +45,11 @@ class MeshFinder:
     @property
     def mesh_folder(self) -> Path:
         """The folder that all meshes' paths are relative to."""
-        return Path(os.path.commonpath([self.root, *self.package_dirs])) if self.package_dirs else self.root
+        return (
+            Path(os.path.commonpath([self.root, *self.package_dirs]))
+            if self.package_dirs
+            else self.root
+        )
 
     def path(self, uri: str) -> str:
         """Return a mesh's path relative to :attr:`mesh_folder`.
@@ -61,7 +65,11 @@ class MeshFinder:
         try:
             file = self._file(uri.replace("\\", "/"), mesh).resolve()
             is_file = file.is_file()
-        except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that no file can have
+        except (
+            OSError,
+            RuntimeError,
+            ValueError,
+        ):  # a loop of links, or a name that no file can have
             raise ModelError(f"{mesh} cannot be found") from None
         if not any(file.is_relative_to(root) for root in (self.root, *self.package_dirs)):
             raise ModelError(f"{mesh} lies outside the robot's folder {self.root}")
@@ -76,11 +84,15 @@ class MeshFinder:
             inner = PurePosixPath(rest)
             if not package or package in (".", "..") or inner.is_absolute():
                 raise ModelError(f"{mesh}: expected package://NAME/path")
-            folders = [folder / package for folder in self.package_dirs if (folder / package).is_dir()]
+            folders = [
+                folder / package for folder in self.package_dirs if (folder / package).is_dir()
+            ]
             folders += [folder for folder, own in self.packages if package in (own, folder.name)]
             folders += [self.root] if package == self.root.name else []
             if not folders:
-                raise ModelError(f"{mesh}: no package {package!r}; package_dirs names the folder it lies in")
+                raise ModelError(
+                    f"{mesh}: no package {package!r}; package_dirs names the folder it lies in"
+                )
             return folders[0] / inner
         if _SCHEME.match(name):
             raise ModelError(f"{mesh}: expected package:// or a path relative to the URDF")
@@ -97,7 +109,9 @@ def _packages_above(folder: Path) -> list[tuple[Path, str]]:
         try:
             if not manifest.is_file() or manifest.stat().st_size > BOUNDS.package_bytes:
                 continue
-            packages.append((parent, _package_name(manifest.read_text(encoding="utf-8", errors="replace"))))
+            packages.append(
+                (parent, _package_name(manifest.read_text(encoding="utf-8", errors="replace")))
+            )
         except OSError:
             continue
     return packages

@@ -56,7 +56,10 @@ def _byte_order_mark_hint(path: Path) -> str:
 
 
 def read_mesh(
-    path: str | Path, *, max_triangles: int = BOUNDS.triangles, max_bytes: int = ROBOT_BOUNDS.mesh_bytes
+    path: str | Path,
+    *,
+    max_triangles: int = BOUNDS.triangles,
+    max_bytes: int = ROBOT_BOUNDS.mesh_bytes,
 ) -> TriangleMesh:
     """Return the triangles of an STL, OBJ, PLY or COLLADA file.
 
@@ -85,7 +88,9 @@ def read_mesh(
             raise ModelError("no triangles")
         _check_count(len(mesh.faces), max_triangles)
         if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-            raise ModelError(f"a face with vertex {mesh.faces.max()} of {len(mesh.vertices)}, counted from 0")
+            raise ModelError(
+                f"a face with vertex {mesh.faces.max()} of {len(mesh.vertices)}, counted from 0"
+            )
         check_coordinates(mesh)
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None
@@ -111,7 +116,11 @@ def check_coordinates(mesh: TriangleMesh, where: str = "") -> None:
         is_odd = ~(np.abs(mesh.vertices) <= BOUNDS.coordinate).all(axis=1)
     if is_odd.any():
         number = int(np.argmax(is_odd))
-        fault = "not finite" if not np.isfinite(mesh.vertices[number]).all() else f"beyond {BOUNDS.coordinate:g}"
+        fault = (
+            "not finite"
+            if not np.isfinite(mesh.vertices[number]).all()
+            else f"beyond {BOUNDS.coordinate:g}"
+        )
         raise ModelError(f"{where}vertex {number} (from 0) has coordinates that are {fault}")
 
 
@@ -127,7 +136,9 @@ def read_part(part: Part) -> TriangleMesh:
     if not isinstance(geometry, Mesh):
         raise ModelError(f"link {part.link}: a {type(geometry).__name__}; expected a mesh")
     if part.file is None:
-        raise ModelError(f"link {part.link}: mesh {geometry.path!r} has no folder; expected a robot read from a file")
+        raise ModelError(
+            f"link {part.link}: mesh {geometry.path!r} has no folder; expected a robot read from a file"
+        )
     try:
         mesh = read_mesh(part.file)
     except ModelError as error:
@@ -171,7 +182,9 @@ def _obj_polygons(content: bytes, count: int) -> list[list[int]]:
             continue
         words = line[1].split(b"#")[0].split()
         if not 3 <= len(words) <= BOUNDS.polygon_corners:
-            raise ModelError(f"a face of {len(words)} corners; expected 3 to {BOUNDS.polygon_corners}")
+            raise ModelError(
+                f"a face of {len(words)} corners; expected 3 to {BOUNDS.polygon_corners}"
+            )
         indices = [int(word.partition(b"/")[0]) for word in words]
         corners = [index - 1 if index > 0 else vertices_above + index for index in indices]
         for index, corner in zip(indices, corners, strict=True):
@@ -191,9 +204,15 @@ def _ply_mesh(content: bytes, count: int) -> TriangleMesh:
         vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(mesh.faces, dtype=np.intp).reshape(-1, 3)
         kind = mesh.visual.kind if len(faces) else None
-        colours = np.asarray(mesh.visual.face_colors)[:, :3].astype(np.uint8) if kind in ("face", "vertex") else None
+        colours = (
+            np.asarray(mesh.visual.face_colors)[:, :3].astype(np.uint8)
+            if kind in ("face", "vertex")
+            else None
+        )
     except Exception as error:  # trimesh passes on any exception of its parsers
         raise ModelError(f"no PLY: {' '.join(str(error).split())[:100]}") from None
     if len(faces) < count:
-        raise ModelError(f"{len(faces)} faces; its header counts {count} (truncated, or a lying count)")
+        raise ModelError(
+            f"{len(faces)} faces; its header counts {count} (truncated, or a lying count)"
+        )
     return TriangleMesh(vertices, faces, colours)

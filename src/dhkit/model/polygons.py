@@ -11,7 +11,9 @@ _CONCAVE_SINE = 1e-9
 """A corner is concave if its turn, relative to the squared length of the longest edge, is below minus this number."""
 
 
-def triangles_of(vertices: Array, corners: NDArray[np.intp], counts: NDArray[np.intp]) -> NDArray[np.intp]:
+def triangles_of(
+    vertices: Array, corners: NDArray[np.intp], counts: NDArray[np.intp]
+) -> NDArray[np.intp]:
     """Return polygons as triangles of vertex indices, shape (m, 3), k - 2 for a polygon of k corners, in their order.
 
     Parameters
@@ -29,7 +31,9 @@ def triangles_of(vertices: Array, corners: NDArray[np.intp], counts: NDArray[np.
     first_triangles = np.cumsum(sizes) - sizes
     first = np.repeat(starts, sizes)
     step = np.arange(int(sizes.sum())) - np.repeat(first_triangles, sizes)
-    triangles: NDArray[np.intp] = corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    triangles: NDArray[np.intp] = corners[
+        np.stack([first, first + step + 1, first + step + 2], axis=1)
+    ]
 
     # Polygons with a concave corner are triangulated one by one.
     for k in np.unique(counts[counts > 3]):
@@ -52,9 +56,13 @@ def _normals(points: Array) -> Array:
 
 def _is_concave(points: Array) -> NDArray[np.bool_]:
     """Return which polygons, points of shape (p, k, 3), have a concave corner."""
-    with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are not finite are refused later
+    with np.errstate(
+        invalid="ignore", over="ignore"
+    ):  # coordinates that are not finite are refused later
         edges = np.roll(points, -1, axis=1) - points
-        turns = np.einsum("pki,pi->pk", np.cross(edges, np.roll(edges, -1, axis=1)), _normals(points))
+        turns = np.einsum(
+            "pki,pi->pk", np.cross(edges, np.roll(edges, -1, axis=1)), _normals(points)
+        )
 
         # A corner is concave if its turn e_i x e_(i+1) points against the normal.
         longest = (edges**2).sum(axis=2).max(axis=1) * np.linalg.norm(_normals(points), axis=1)

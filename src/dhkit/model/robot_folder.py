@@ -28,9 +28,15 @@ def model_errors(path: Path) -> Iterator[None]:
 
 def mesh_paths(description: Description) -> tuple[str, ...]:
     """Return the paths of a description's meshes, each once: base, links, tool."""
-    shapes = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    shapes = (
+        description.base.shapes,
+        *(joint.shapes for joint in description.joints),
+        description.tool.shapes,
+    )
     geometries = (shape.geometry for shape in itertools.chain(*shapes))
-    return tuple(dict.fromkeys(geometry.path for geometry in geometries if isinstance(geometry, Mesh)))
+    return tuple(
+        dict.fromkeys(geometry.path for geometry in geometries if isinstance(geometry, Mesh))
+    )
 
 
 def copy_files(sources: Mapping[str, Path], folder: Path) -> list[Path]:
@@ -56,8 +62,12 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
     folder = description.mesh_folder
     with model_errors(path):
         if names and folder is None:
-            raise ModelError(f"{description.name}: where its mesh {next(iter(names))!r} lies is not known")
-        sources = {} if folder is None else {name: folder / source for source, name in names.items()}
+            raise ModelError(
+                f"{description.name}: where its mesh {next(iter(names))!r} lies is not known"
+            )
+        sources = (
+            {} if folder is None else {name: folder / source for source, name in names.items()}
+        )
         copies = copy_files(sources, path.parent)
         write_atomically(path, to_toml(_with_mesh_paths(description, names.__getitem__)))
     return (path, *copies)

@@ -52,7 +52,9 @@ class MassProperties:
         return Body(exact(float(self.mass)), (x, y, z), Inertia.of_tensor(self.inertia), name=name)
 
     def __repr__(self) -> str:
-        return repr_line(type(self).__name__, "", f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m")
+        return repr_line(
+            type(self).__name__, "", f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +69,16 @@ class ShapeInertia(MassProperties):
 
     def __repr__(self) -> str:
         volume = f"{self.volume:.4g} m^3 of {self.method.value}"
-        return repr_line("ShapeInertia", "", f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m, {volume}")
+        return repr_line(
+            "ShapeInertia", "", f"{self.mass:.4g} kg, centre of mass {listed(self.com)} m, {volume}"
+        )
 
 
 def shape_inertia(
-    mesh: TriangleMesh | Sequence[TriangleMesh], *, density: float | None = None, mass: float | None = None
+    mesh: TriangleMesh | Sequence[TriangleMesh],
+    *,
+    density: float | None = None,
+    mass: float | None = None,
 ) -> ShapeInertia:
     """Return mass, centre of mass and inertia of a homogeneous body of a mesh's shape.
 
@@ -106,7 +113,9 @@ def shape_inertia(
     >>> round(body.mass, 12), body.com.round(12).tolist()
     (1.0, [0.25, 0.25, 0.25])
     """
-    stated = [(name, value) for name, value in (("density", density), ("mass", mass)) if value is not None]
+    stated = [
+        (name, value) for name, value in (("density", density), ("mass", mass)) if value is not None
+    ]
     if len(stated) != 1:
         raise ModelError(
             f"{'both' if stated else 'neither'} of density and mass; expected exactly one, nothing is assumed"
@@ -162,7 +171,9 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
     try:
         hull = ConvexHull(mesh.vertices)
     except QhullError:
-        raise ModelError("the mesh encloses no volume: its vertices lie in a plane or on a line") from None
+        raise ModelError(
+            "the mesh encloses no volume: its vertices lie in a plane or on a line"
+        ) from None
 
     # Qhull's triangles have no common orientation: those with (b - a) x (c - a) against the outward normal are turned.
     faces = np.asarray(hull.simplices, dtype=np.intp)

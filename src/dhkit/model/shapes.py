@@ -57,7 +57,9 @@ class Part:
         return T
 
     def __repr__(self) -> str:
-        return repr_line("Part", f"link {self.link}", f"{type(self.geometry).__name__.lower()}, {self.color}")
+        return repr_line(
+            "Part", f"link {self.link}", f"{type(self.geometry).__name__.lower()}, {self.color}"
+        )
 
 
 @takes_robot
@@ -100,7 +102,11 @@ def mesh_versions(description: Description) -> MeshVersions:
 @lru_cache(maxsize=256)
 def _mesh_paths(description: Description) -> tuple[str, ...]:
     """Return the paths of a robot's meshes, as its shapes name them."""
-    own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    own = (
+        description.base.shapes,
+        *(joint.shapes for joint in description.joints),
+        description.tool.shapes,
+    )
     geometries = [shape.geometry for shape in chain.from_iterable(own)]
     meshes = [geometry for geometry in geometries if isinstance(geometry, Mesh)]
     return tuple(dict.fromkeys(mesh.path.replace("\\", "/") for mesh in meshes))
@@ -126,7 +132,11 @@ def missing_shapes(description: Description) -> tuple[str, ...]:
     They are shapes of the description, and those of the file that it comes from, which its notes name.
     """
     places = ["the base", *(f"link {i + 1}" for i in range(description.n)), "the tool"]
-    own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    own = (
+        description.base.shapes,
+        *(joint.shapes for joint in description.joints),
+        description.tool.shapes,
+    )
     found = []
     for place, shapes in zip(places, own, strict=True):
         for shape in shapes:
@@ -149,12 +159,19 @@ def with_drawn_shapes(description: Description) -> Description:
     """
     described, drawn = _parts(description)
     explicit: list[tuple[Shape, ...]] = []
-    own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    own = (
+        description.base.shapes,
+        *(joint.shapes for joint in description.joints),
+        description.tool.shapes,
+    )
     for given, here, others in zip(own, described, drawn, strict=True):
         solids = tuple(
-            Shape(part.geometry, placement_of_pose(part.T_link_part, "shape"), part.color) for part in others
+            Shape(part.geometry, placement_of_pose(part.T_link_part, "shape"), part.color)
+            for part in others
         )
-        explicit.append(given if here else (*given, *solids))  # meshes that cannot be read stay missing
+        explicit.append(
+            given if here else (*given, *solids)
+        )  # meshes that cannot be read stay missing
     base, *links, at_tool = explicit
     if not described[-1]:  # drawn in the frame of the last link
         links[-1] = (*links[-1], *at_tool)
@@ -162,7 +179,10 @@ def with_drawn_shapes(description: Description) -> Description:
     return replace(
         description,
         base=replace(description.base, shapes=base),
-        joints=tuple(replace(joint, shapes=shapes) for joint, shapes in zip(description.joints, links, strict=True)),
+        joints=tuple(
+            replace(joint, shapes=shapes)
+            for joint, shapes in zip(description.joints, links, strict=True)
+        ),
         tool=replace(description.tool, shapes=at_tool),
         drawn=False,
     )
@@ -175,14 +195,22 @@ def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]
     arm = Drawing(description)
     colors = [_BASE_COLOR, *(_PALETTE[i % len(_PALETTE)] for i in range(n))]
     own = (description.base.shapes, *(joint.shapes for joint in description.joints))
-    described = [_described_parts(description, shapes, i, colors[i]) for i, shapes in enumerate(own)]
+    described = [
+        _described_parts(description, shapes, i, colors[i]) for i, shapes in enumerate(own)
+    ]
     at_tool = _tool_parts(description, described[-1])
     if any(described) and not description.drawn:
         return [*described, at_tool], [[] for _ in range(n + 2)]
-    drawn = [[] if parts else _drawn_parts(i, arm.link(i), colors[i]) for i, parts in enumerate(described)]
+    drawn = [
+        [] if parts else _drawn_parts(i, arm.link(i), colors[i])
+        for i, parts in enumerate(described)
+    ]
     gripper: list[Part] = []
     if not at_tool and (not described[-1] or not np.array_equal(T_last_tool, _IDENTITY)):
-        gripper = [*_drawn_parts(n, arm.neck(), colors[-1]), *_drawn_parts(n, arm.gripper(), _BASE_COLOR)]
+        gripper = [
+            *_drawn_parts(n, arm.neck(), colors[-1]),
+            *_drawn_parts(n, arm.gripper(), _BASE_COLOR),
+        ]
     return [*described, at_tool], [*drawn, gripper]
 
 
@@ -195,15 +223,25 @@ def _tool_parts(description: Description, last_link: Sequence[Part]) -> list[Par
     n = description.n
     T_last_tool = description.numbers.T_last_tool
     in_tool = _described_parts(description, description.tool.shapes, n, _BASE_COLOR)
-    body, T_link_body = (last_link[-1].body, last_link[-1].T_link_body) if last_link else (0, _IDENTITY)
-    T_body_tool = T_last_tool if np.array_equal(T_link_body, _IDENTITY) else np.linalg.solve(T_link_body, T_last_tool)
+    body, T_link_body = (
+        (last_link[-1].body, last_link[-1].T_link_body) if last_link else (0, _IDENTITY)
+    )
+    T_body_tool = (
+        T_last_tool
+        if np.array_equal(T_link_body, _IDENTITY)
+        else np.linalg.solve(T_link_body, T_last_tool)
+    )
     return [
-        replace(part, T_body_part=T_body_tool @ part.T_link_part, body=body, T_link_body=T_link_body)
+        replace(
+            part, T_body_part=T_body_tool @ part.T_link_part, body=body, T_link_body=T_link_body
+        )
         for part in in_tool
     ]
 
 
-def _described_parts(description: Description, shapes: Sequence[Shape], link: int, color: str) -> list[Part]:
+def _described_parts(
+    description: Description, shapes: Sequence[Shape], link: int, color: str
+) -> list[Part]:
     """Return shapes of a link as parts, without meshes whose files are missing or unreadable."""
     values = resolved(description.parameters)
     frames = dict.fromkeys(shape.frame for shape in shapes)
@@ -219,5 +257,15 @@ def _described_parts(description: Description, shapes: Sequence[Shape], link: in
         T_body_part = matrix(shape.placement, values)
         own_color = shape.color or color
         T_link_body = poses[shape.frame]
-        parts.append(Part(link, with_values(geometry, values), T_body_part, own_color, file, shape.body, T_link_body))
+        parts.append(
+            Part(
+                link,
+                with_values(geometry, values),
+                T_body_part,
+                own_color,
+                file,
+                shape.body,
+                T_link_body,
+            )
+        )
     return parts

@@ -31,7 +31,9 @@ _TOUCHING_DEPTH = 1e-6
 """Depth to which touching shells may overlap, as a share of the mesh's size: files round their vertices."""
 _MAX_SHARED_VOLUME = 1e-3
 """Volume that two shells may share, relative to the smaller one: round parts that fit overlap by their facets."""
-_OBLIQUE_ROTATION = np.linalg.qr(np.array([[0.61, 0.23, 0.37], [0.17, 0.71, 0.53], [0.43, 0.31, 0.67]]))[0]
+_OBLIQUE_ROTATION = np.linalg.qr(
+    np.array([[0.61, 0.23, 0.37], [0.17, 0.71, 0.53], [0.43, 0.31, 0.67]])
+)[0]
 _OBLIQUE_ROTATION *= np.linalg.det(_OBLIQUE_ROTATION)
 """A rotation that maps no usual direction of a machine part to z."""
 
@@ -69,7 +71,9 @@ class Shells:
     @cached_property
     def volume(self) -> Array:
         """The signed volume of each shell as it is in the mesh, shape (count,), m^3 for a mesh in m."""
-        return np.array([_signed_volume(self.mesh.vertices[self._faces(k)]) for k in range(self.count)])
+        return np.array(
+            [_signed_volume(self.mesh.vertices[self._faces(k)]) for k in range(self.count)]
+        )
 
     def turn(self, chosen: NDArray[np.bool_]) -> None:
         """Turn the shells whose index, shape (count,), is True inside out."""
@@ -87,7 +91,11 @@ class Shells:
         each other.
         """
         inverted = np.flatnonzero(self.volume < 0)
-        wrong = [k for k in inverted if np.mean(self._windings(int(k)) > _MIN_INSIDE_WINDING) < _MIN_CAVITY_SHARE]
+        wrong = [
+            k
+            for k in inverted
+            if np.mean(self._windings(int(k)) > _MIN_INSIDE_WINDING) < _MIN_CAVITY_SHARE
+        ]
         return np.isin(np.arange(self.count), wrong)
 
     def doubled(self) -> int:
@@ -136,7 +144,10 @@ class Shells:
 
     def _allowed_overlap(self, k: int) -> float:
         area = np.linalg.norm(area_vectors(self.mesh.vertices[self._faces(k)]), axis=1).sum() / 2
-        return max(_TOUCHING_DEPTH * self._size * float(area), _MAX_SHARED_VOLUME * abs(float(self.volume[k])))
+        return max(
+            _TOUCHING_DEPTH * self._size * float(area),
+            _MAX_SHARED_VOLUME * abs(float(self.volume[k])),
+        )
 
     def _solid(self, k: int) -> Manifold | None:
         """Return a shell, or a cavity's inside, as a solid; None if an edge belongs to more than two triangles."""
@@ -152,7 +163,9 @@ class Shells:
         """Return the winding numbers of the other shells at a shell's test points, shape (p,)."""
         points = self._test_points(k)
         low, high = self._bounds
-        in_box: NDArray[np.bool_] = np.all((low[None] <= points[:, None]) & (points[:, None] <= high[None]), axis=2)
+        in_box: NDArray[np.bool_] = np.all(
+            (low[None] <= points[:, None]) & (points[:, None] <= high[None]), axis=2
+        )
         in_box[:, k] = False
         windings = np.zeros(len(points))
         for j in np.flatnonzero(in_box.any(axis=0)):
@@ -164,7 +177,9 @@ class Shells:
     def _own_windings(self, k: int) -> Array:
         """Return the winding numbers of a shell at its own test points, shape (p,): 1 if it encloses once."""
         sign = -1.0 if self.flipped[k] else 1.0
-        return sign * self._rays.windings(slice(self._ends[k], self._ends[k + 1]), self._test_points(k))
+        return sign * self._rays.windings(
+            slice(self._ends[k], self._ends[k + 1]), self._test_points(k)
+        )
 
     def _test_points(self, k: int) -> Array:
         """Return points just inside triangles' middles; points on a face that two shells share would be undecided."""
@@ -175,7 +190,9 @@ class Shells:
         return points
 
 
-def _common_volume(solid: Manifold | None, around: list[tuple[Manifold | None, bool]]) -> float | None:
+def _common_volume(
+    solid: Manifold | None, around: list[tuple[Manifold | None, bool]]
+) -> float | None:
     """Return the volume of a solid inside the material of larger shells, from which cavities are subtracted."""
     from manifold3d import Manifold
 
@@ -199,9 +216,9 @@ def _shell_numbers(mesh: TriangleMesh) -> NDArray[np.intp]:
     """Return the number of the shell that each triangle belongs to, shape (m,)."""
     # Two edges connect the three vertices of a triangle.
     first, middle, last = mesh.faces.astype(np.int32).T
-    labels = component_labels(np.concatenate([first, middle]), np.concatenate([middle, last]), len(mesh.vertices))[
-        mesh.faces[:, 0]
-    ]
+    labels = component_labels(
+        np.concatenate([first, middle]), np.concatenate([middle, last]), len(mesh.vertices)
+    )[mesh.faces[:, 0]]
     if not labels.any():
         return np.zeros(len(mesh.faces), dtype=np.intp)
     _, numbers = np.unique(labels, return_inverse=True)

@@ -22,9 +22,13 @@ from dhkit.errors import ModelError
 from dhkit.model.shape_inertia import MassProperties
 
 REPORT = re.compile(r"^[ \t]*Mass properties of\b[ \t]*(.*?)[ \t]*$", re.IGNORECASE | re.MULTILINE)
-_ASSEMBLY = re.compile(r"Mass properties of\b.*\.sldasm\b|\([ \t]*Assembly Configuration\b", re.IGNORECASE)
+_ASSEMBLY = re.compile(
+    r"Mass properties of\b.*\.sldasm\b|\([ \t]*Assembly Configuration\b", re.IGNORECASE
+)
 _DECIMAL = r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?"
-_MASS = re.compile(rf"^[ \t]*Mass[ \t]*=[ \t]*({_DECIMAL})[ \t]*([a-z]+)", re.IGNORECASE | re.MULTILINE)
+_MASS = re.compile(
+    rf"^[ \t]*Mass[ \t]*=[ \t]*({_DECIMAL})[ \t]*([a-z]+)", re.IGNORECASE | re.MULTILINE
+)
 _CENTRE = re.compile(r"Cent(?:er|re) of mass:?[ \t]*\([ \t]*([a-z]+)[ \t]*\)", re.IGNORECASE)
 _BLOCK = re.compile(r"moments of inertia:?[ \t]*\(([^)]*)\)[^\n]*\n([^\n]*)", re.IGNORECASE)
 _NOTATION = re.compile(r"\b(positive|negative)\s+tensor\s+notation", re.IGNORECASE)
@@ -33,9 +37,22 @@ _AXIS = re.compile(
     rf"\bI([xyz])[ \t]*=[ \t]*\([ \t]*({_DECIMAL})[ \t]*,[ \t]+({_DECIMAL})[ \t]*,[ \t]+({_DECIMAL})[ \t]*\)"
 )
 _COORDINATE = re.compile(rf"^[ \t]*([XYZ])[ \t]*=[ \t]*({_DECIMAL})", re.MULTILINE)
-_MASS_UNITS = {"grams": 1e-3, "gram": 1e-3, "kilograms": 1.0, "kilogram": 1.0, "milligrams": 1e-6, "pounds": 0.45359237}
+_MASS_UNITS = {
+    "grams": 1e-3,
+    "gram": 1e-3,
+    "kilograms": 1.0,
+    "kilogram": 1.0,
+    "milligrams": 1e-6,
+    "pounds": 0.45359237,
+}
 """Mass units by SolidWorks' names, kg."""
-_LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inches": 0.0254, "feet": 0.3048}
+_LENGTH_UNITS = {
+    "millimeters": 1e-3,
+    "centimeters": 1e-2,
+    "meters": 1.0,
+    "inches": 0.0254,
+    "feet": 0.3048,
+}
 """Length units by SolidWorks' names, m."""
 _ENTRY_NAMES = ("xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz")
 _MAX_MISFIT_RATIO = 0.2
@@ -88,7 +105,9 @@ class _Centre:
     com_half: float
 
 
-def read_solidworks_report(text: str, path: str, first: int = 1) -> tuple[str, MassProperties, tuple[str, ...]]:
+def read_solidworks_report(
+    text: str, path: str, first: int = 1
+) -> tuple[str, MassProperties, tuple[str, ...]]:
     """Read one report; return the part's name, its mass properties in SI, and notes.
 
     Parameters
@@ -135,18 +154,24 @@ class _ReportReader:
         listed, half = self._tensor(blocks[_Block.CENTRE], "L")
         tiny = np.finfo(float).tiny
         rounding = float(half.max() / max(np.abs(listed).max(), tiny))
-        warnings += self._rounding_warning("moments", rounding, " of the largest", blocks[_Block.CENTRE])
+        warnings += self._rounding_warning(
+            "moments", rounding, " of the largest", blocks[_Block.CENTRE]
+        )
 
         # The mean square distance from the centre of mass is k^2 = integral of r^2 dm / m = (Lxx + Lyy + Lzz) / (2 m).
         gyration = np.sqrt(max(float(np.trace(listed)), tiny) / (2 * mass))
         rounding = centre.com_half / gyration
-        warnings += self._rounding_warning("centre of mass", rounding, " of its radius of gyration", mass_line)
+        warnings += self._rounding_warning(
+            "centre of mass", rounding, " of its radius of gyration", mass_line
+        )
         sign, sign_note = self._sign(listed, half, centre, blocks)
         block_note = "block read: moments about the centre of mass, axes of the output coordinate system (Lxx ... Lzz)"
         properties = MassProperties(mass, centre.com, _with_products_times(-sign, listed))
         return title[1].strip() if title else "", properties, (block_note, sign_note, *warnings)
 
-    def _rounding_warning(self, what: str, share: float, of: str, at: re.Match[str]) -> tuple[str, ...]:
+    def _rounding_warning(
+        self, what: str, share: float, of: str, at: re.Match[str]
+    ) -> tuple[str, ...]:
         """Return a warning if half a unit of the last decimal is a large share of a quantity; refuse a larger one."""
         verb, are = ("have", "are") if what == "moments" else ("has", "is")
         if share > _MAX_ROUNDING:
@@ -156,7 +181,9 @@ class _ReportReader:
                 at,
             )
         is_warned = share > _WARNED_ROUNDING
-        return (f"warning: its {what} {are} rounded to {100 * share:.1g} %{of}",) if is_warned else ()
+        return (
+            (f"warning: its {what} {are} rounded to {100 * share:.1g} %{of}",) if is_warned else ()
+        )
 
     def _centre_of_mass(self) -> tuple[Array, float]:
         """Return the centre of mass, shape (3,), m, and half a unit of its last decimals."""
@@ -165,8 +192,12 @@ class _ReportReader:
         matches = _COORDINATE.finditer(self.text, heading.end())
         numbers = {match[1]: self._number(match[2], match) for match in matches}
         if set(numbers) != set("XYZ"):
-            raise self._error("no X, Y and Z of the centre of mass; expected three lines 'X = ...'", heading)
-        return unit * np.array([numbers[k].value for k in "XYZ"]), unit * max(numbers[k].half for k in "XYZ")
+            raise self._error(
+                "no X, Y and Z of the centre of mass; expected three lines 'X = ...'", heading
+            )
+        return unit * np.array([numbers[k].value for k in "XYZ"]), unit * max(
+            numbers[k].half for k in "XYZ"
+        )
 
     def _block_kind(self, block: re.Match[str]) -> _Block:
         """Return the kind of a block by the line below its heading."""
@@ -180,30 +211,44 @@ class _ReportReader:
         unit = self._moment_unit(block)
         entries = self._entries(block, letter)
         if missing := [name for name in _ENTRY_NAMES if name not in entries]:
-            raise self._error(f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block)
+            raise self._error(
+                f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block
+            )
         numbers = np.array([entries[name] for name in _ENTRY_NAMES]).reshape(3, 3, 2)
         listed = unit * numbers[..., 0]
         half = unit * numbers[..., 1]
         if np.any(np.abs(listed - listed.T) > 2 * (half + half.T)):
-            raise self._error(f"{letter}xy and {letter}yx differ; expected a symmetric tensor", block)
+            raise self._error(
+                f"{letter}xy and {letter}yx differ; expected a symmetric tensor", block
+            )
         return (listed + listed.T) / 2, half
 
     def _entries(self, block: re.Match[str], letter: str) -> dict[str, _Number]:
         following = _BLOCK.search(self.text, block.end())
-        matches = _ENTRY.finditer(self.text, block.end(), following.start() if following else len(self.text))
+        matches = _ENTRY.finditer(
+            self.text, block.end(), following.start() if following else len(self.text)
+        )
         return {match[2]: self._number(match[3], match) for match in matches if match[1] == letter}
 
     def _axis(self, match: re.Match[str]) -> tuple[_Number, _Number, _Number]:
         """Return the coordinates of a principal axis from its line."""
-        return self._number(match[2], match), self._number(match[3], match), self._number(match[4], match)
+        return (
+            self._number(match[2], match),
+            self._number(match[3], match),
+            self._number(match[4], match),
+        )
 
     def _moment_unit(self, block: re.Match[str]) -> float:
         words = block[1].lower().replace("*", " ").split()
         if len(words) != 3 or words[1] != "square":
             raise self._error(
-                f"the unit {block[1].strip()[:40]!r}; expected such as 'grams * square millimeters'", block
+                f"the unit {block[1].strip()[:40]!r}; expected such as 'grams * square millimeters'",
+                block,
             )
-        return self._unit(words[0], _MASS_UNITS, block) * self._unit(words[2], _LENGTH_UNITS, block) ** 2
+        return (
+            self._unit(words[0], _MASS_UNITS, block)
+            * self._unit(words[2], _LENGTH_UNITS, block) ** 2
+        )
 
     def _sign(
         self, listed: Array, half: Array, centre: _Centre, blocks: Mapping[_Block, re.Match[str]]
@@ -225,11 +270,14 @@ class _ReportReader:
         evidence = {
             block: 1.0 if plus < minus else -1.0
             for block, plus, minus, allowed in misfits
-            if max(plus, minus) > allowed and min(plus, minus) < _MAX_MISFIT_RATIO * max(plus, minus)
+            if max(plus, minus) > allowed
+            and min(plus, minus) < _MAX_MISFIT_RATIO * max(plus, minus)
         }
         signs = set(evidence.values())
         if len(signs) > 1:
-            raise self._error("its blocks disagree about the sign of the products", blocks[_Block.CENTRE])
+            raise self._error(
+                "its blocks disagree about the sign of the products", blocks[_Block.CENTRE]
+            )
         names = {1.0: "+integral of x y dm", -1.0: "entries of the tensor, -integral of x y dm"}
         if signs:
             sign = signs.pop()
@@ -237,8 +285,14 @@ class _ReportReader:
         if notation := _NOTATION.search(self.text):
             word = notation[1].lower()
             sign = 1.0 if word == "positive" else -1.0
-            return sign, f"products listed as {names[sign]}, as the report states ({word} tensor notation)"
-        return 1.0, f"products taken as {names[1.0]}, SolidWorks' default: the other blocks do not decide their sign"
+            return (
+                sign,
+                f"products listed as {names[sign]}, as the report states ({word} tensor notation)",
+            )
+        return (
+            1.0,
+            f"products taken as {names[1.0]}, SolidWorks' default: the other blocks do not decide their sign",
+        )
 
     def _principal_misfit(self, listed: Array, half: Array, block: re.Match[str]) -> _Misfit:
         """Return the deviation of both tensors from the principal moments and axes."""
@@ -247,7 +301,9 @@ class _ReportReader:
         if missing := [k for k in "xyz" if k not in entries]:
             raise self._error(f"no P{missing[0]}; expected the principal moments Px, Py, Pz", block)
         moments = unit * np.array([entries[k].value for k in "xyz"])
-        rounding = _MISFIT_ROUNDINGS * (np.abs(half).max() + unit * max(entries[k].half for k in "xyz"))
+        rounding = _MISFIT_ROUNDINGS * (
+            np.abs(half).max() + unit * max(entries[k].half for k in "xyz")
+        )
         deviations = []
         axes = {match[1]: match for match in _AXIS.finditer(self.text, block.end())}
         for sign in (1.0, -1.0):
@@ -258,13 +314,18 @@ class _ReportReader:
                 listed_axes = [self._axis(axes[k]) for k in "xyz"]
                 rows = np.array([[x.value, y.value, z.value] for x, y, z in listed_axes])
                 last = max(number.half for number in listed_axes[0])
-                residual = np.abs(rows @ tensor - moments[:, None] * rows).max() - 4 * last * np.abs(moments).max()
+                residual = (
+                    np.abs(rows @ tensor - moments[:, None] * rows).max()
+                    - 4 * last * np.abs(moments).max()
+                )
                 deviation = max(deviation, float(residual))
             deviations.append(deviation)
         allowed = float(rounding + 1e-9 * np.abs(moments).max())
         return _Misfit("the principal moments and axes", deviations[0], deviations[1], allowed)
 
-    def _steiner_misfit(self, listed: Array, half: Array, centre: _Centre, block: re.Match[str]) -> _Misfit:
+    def _steiner_misfit(
+        self, listed: Array, half: Array, centre: _Centre, block: re.Match[str]
+    ) -> _Misfit:
         """Return the deviation of both tensors, with Steiner's terms, from the block at the origin."""
         origin, origin_half = self._tensor(block, "I")
         mass = centre.mass
@@ -277,18 +338,28 @@ class _ReportReader:
         # Half units of the last places of all numbers are carried through the same formula.
         reach = float(np.abs(com).max()) + com_half
         allowed = (
-            _MISFIT_ROUNDINGS * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
+            _MISFIT_ROUNDINGS
+            * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
             + 1e-9 * np.abs(origin).max()
         )
         allowed += _MISFIT_ROUNDINGS * centre.relative_half * float(np.abs(steiner).max())
         difference = origin - listed
-        plus, minus = (float(np.abs(difference - _with_products_times(-s, steiner)).max()) for s in (1.0, -1.0))
-        return _Misfit("Steiner's terms of the block at the output coordinate system", plus, minus, float(allowed))
+        plus, minus = (
+            float(np.abs(difference - _with_products_times(-s, steiner)).max()) for s in (1.0, -1.0)
+        )
+        return _Misfit(
+            "Steiner's terms of the block at the output coordinate system",
+            plus,
+            minus,
+            float(allowed),
+        )
 
     def _match(self, pattern: re.Pattern[str], expected: str) -> re.Match[str]:
         match = pattern.search(self.text)
         if match is None:
-            raise ModelError(f"{self.path}, line {self.first}: expected {expected}, as SolidWorks writes it in English")
+            raise ModelError(
+                f"{self.path}, line {self.first}: expected {expected}, as SolidWorks writes it in English"
+            )
         return match
 
     def _unit(self, word: str, known: dict[str, float], at: re.Match[str]) -> float:
@@ -298,11 +369,15 @@ class _ReportReader:
 
     def _number(self, text: str, at: re.Match[str]) -> _Number:
         if "," in text or text.count(".") > 1:
-            raise self._error(f"found {text[:40]!r}; decimal commas are not read, write 1.5 for 1,5", at)
+            raise self._error(
+                f"found {text[:40]!r}; decimal commas are not read, write 1.5 for 1,5", at
+            )
         mantissa, _, exponent_text = text.lower().partition("e")
         places = len(mantissa.partition(".")[2])
         exponent = int(exponent_text or 0)
-        return _Number(float(text), 0.5 * 10.0 ** (exponent - places) if abs(exponent) < 300 else 0.0)
+        return _Number(
+            float(text), 0.5 * 10.0 ** (exponent - places) if abs(exponent) < 300 else 0.0
+        )
 
     def _error(self, message: str, at: re.Match[str]) -> ModelError:
         line = self.first + self.text.count("\n", 0, at.start())

@@ -33,7 +33,9 @@ def binary_corners(content: bytes) -> Array:
         No whole number of facets.
     """
     if len(content) < _HEADER_LENGTH or (len(content) - _HEADER_LENGTH) % _FACET.itemsize:
-        raise ModelError(f"{len(content)} bytes; expected a header of {_HEADER_LENGTH} and facets of {_FACET.itemsize}")
+        raise ModelError(
+            f"{len(content)} bytes; expected a header of {_HEADER_LENGTH} and facets of {_FACET.itemsize}"
+        )
     return np.frombuffer(content, dtype=_FACET, offset=_HEADER_LENGTH)["corners"].astype(np.float64)
 
 
@@ -72,10 +74,14 @@ def coordinates(rows: Sequence[tuple[bytes, bytes, bytes]]) -> Array:
     """
     for text in chain.from_iterable(rows):
         if len(text) > BOUNDS.coordinate_characters:
-            raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long")
+            raise ValueError(
+                f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long"
+            )
         if b"_" in text:  # NumPy would read 1_000 as Python does
             raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}")
-    return np.array(rows, dtype=f"S{BOUNDS.coordinate_characters}").astype(np.float64).reshape(-1, 3)
+    return (
+        np.array(rows, dtype=f"S{BOUNDS.coordinate_characters}").astype(np.float64).reshape(-1, 3)
+    )
 
 
 def binary_stl(title: str, corners: Array) -> bytes:

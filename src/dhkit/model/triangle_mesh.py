@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array
 from dhkit.display import repr_line
 
-_HASH_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+_HASH_FACTORS = np.array(
+    [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64
+)
 """Odd factors that spread three coordinates over 64 bits."""
 
 
@@ -42,7 +44,9 @@ class TriangleMesh:
     @classmethod
     def of_corners(cls, corners: Array) -> TriangleMesh:
         """Return a mesh of separate triangles, corners of shape (m, 3, 3), m unless stated otherwise."""
-        return cls(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.intp).reshape(-1, 3))
+        return cls(
+            corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.intp).reshape(-1, 3)
+        )
 
     @property
     def corners(self) -> Array:
@@ -104,7 +108,9 @@ class TriangleMesh:
 
     def __repr__(self) -> str:
         size = f", {self.size:.4g} m across" if len(self.vertices) else ""
-        return repr_line("TriangleMesh", "", f"{len(self.faces)} triangles, {len(self.vertices)} vertices{size}")
+        return repr_line(
+            "TriangleMesh", "", f"{len(self.faces)} triangles, {len(self.vertices)} vertices{size}"
+        )
 
 
 def joined_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
@@ -142,7 +148,9 @@ def unit_normals(corners: Array) -> Array:
     return normals
 
 
-def component_labels(first: NDArray[np.integer], second: NDArray[np.integer], count: int) -> NDArray[np.intp]:
+def component_labels(
+    first: NDArray[np.integer], second: NDArray[np.integer], count: int
+) -> NDArray[np.intp]:
     """Return the connected component of each of ``count`` nodes; edges join nodes with these indices, shape (e,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -172,11 +180,17 @@ def same_vertices(vertices: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     bits = rows.view(np.uint64)
     digest = bits[:, 0] * _HASH_FACTORS[0]
     for k in (1, 2):
-        digest = (digest ^ (digest >> np.uint64(29))) * _HASH_FACTORS[k] + bits[:, k] * _HASH_FACTORS[(k + 1) % 3]
+        digest = (digest ^ (digest >> np.uint64(29))) * _HASH_FACTORS[k] + bits[
+            :, k
+        ] * _HASH_FACTORS[(k + 1) % 3]
     # As np.unique works, but with a sort that need not be stable: a third of the time.
     order = np.argsort(digest)
     ordered = digest[order]
-    is_first = np.concatenate([[True], ordered[1:] != ordered[:-1]]) if len(rows) else np.zeros(0, dtype=bool)
+    is_first = (
+        np.concatenate([[True], ordered[1:] != ordered[:-1]])
+        if len(rows)
+        else np.zeros(0, dtype=bool)
+    )
     first_rows = order[is_first]
     sets = np.empty(len(rows), dtype=np.intp)
     sets[order] = np.cumsum(is_first) - 1

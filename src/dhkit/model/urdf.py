@@ -58,7 +58,11 @@ class Origin(NamedTuple):
 
 
 @takes_robot
-def urdf_text(description: Description, mesh_path: PathMap | None = None, collision_path: PathMap | None = None) -> str:
+def urdf_text(
+    description: Description,
+    mesh_path: PathMap | None = None,
+    collision_path: PathMap | None = None,
+) -> str:
     """Return a description as URDF text, SI and radians, numbers as the shortest decimals that read back equal.
 
     Parameters
@@ -116,7 +120,9 @@ def _urdf(description: Description, drawn: Iterable[Part], paths: Mapping[str, P
 
 
 @takes_robot
-def write_urdf(description: Description, path: str | Path, mesh_prefix: str | None = None) -> tuple[Path, ...]:
+def write_urdf(
+    description: Description, path: str | Path, mesh_prefix: str | None = None
+) -> tuple[Path, ...]:
     """Write a URDF, with the meshes that it names in ``meshes/`` beside it; return the files, the URDF first.
 
     Parameters
@@ -154,7 +160,9 @@ def _comment(description: Description) -> str:
     for coupling in description.couplings:
         i, j = coupling.joints
         inertia = description.numbers.coupling[i - 1, j - 1]
-        lines.append(f"Nor the inertia of a drive that joints {i} and {j} both turn: {inertia:.9g}.")
+        lines.append(
+            f"Nor the inertia of a drive that joints {i} and {j} both turn: {inertia:.9g}."
+        )
     if description.source:
         lines.append(f"Source: {description.source}")
     # Two hyphens would end an XML comment.
@@ -231,7 +239,9 @@ def _add_joint(robot: _Element, description: Description, i: int) -> None:
     )
     if numbers.viscous[k] or numbers.coulomb[k].any():
         friction = float(np.abs(numbers.coulomb[k]).mean())
-        _child(element, "dynamics", damping=_texts([numbers.viscous[k]]), friction=_texts([friction]))
+        _child(
+            element, "dynamics", damping=_texts([numbers.viscous[k]]), friction=_texts([friction])
+        )
 
 
 def _add_fixed_joint(robot: _Element, parent: str, child: str, origin: Origin) -> None:
@@ -249,7 +259,9 @@ def _add_inertial(link: _Element, origin: Origin, mass: float, tensor: Array) ->
     _child(inertial, "inertia", **moments)
 
 
-def _add_part(link: _Element, part: Part, T_link_frame: Array, paths: Mapping[str, PathMap]) -> None:
+def _add_part(
+    link: _Element, part: Part, T_link_frame: Array, paths: Mapping[str, PathMap]
+) -> None:
     """Add a drawn part as visual and as collision."""
     rgb = [int(part.color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     for z, tag, attributes in _solids(part):
@@ -257,10 +269,16 @@ def _add_part(link: _Element, part: Part, T_link_frame: Array, paths: Mapping[st
         T_part_solid[2, 3] = z
         origin = _origin_of(T_link_frame @ part.T_link_part @ T_part_solid)
         for purpose, path in paths.items():
-            named = {key: path(text) if key == "filename" else text for key, text in attributes.items()}
+            named = {
+                key: path(text) if key == "filename" else text for key, text in attributes.items()
+            }
             element = _child(link, purpose)
             _add_origin(
-                element, Origin(np.round(origin.xyz, _SHAPE_DECIMALS), tuple(np.round(origin.rpy, _SHAPE_DECIMALS)))
+                element,
+                Origin(
+                    np.round(origin.xyz, _SHAPE_DECIMALS),
+                    tuple(np.round(origin.rpy, _SHAPE_DECIMALS)),
+                ),
             )
             _child(_child(element, "geometry"), tag, **named)
             if purpose == "visual":

@@ -128,7 +128,9 @@ def read_chain(
     return chain_of(read_urdf(path, as_designed=as_designed), base, tip, side=side)
 
 
-def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *, side: Side = "freeze") -> Chain:
+def chain_of(
+    tree: UrdfTree, base: str | None = None, tip: str | None = None, *, side: Side = "freeze"
+) -> Chain:
     """Return the chain between two links of a URDF that was read; see :func:`read_chain`.
 
     Raises
@@ -142,7 +144,9 @@ def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *,
         if link is not None and not isinstance(link, str):
             raise TypeError(f"{what} is {link!r}; expected the name of a link")
         if link is not None and link not in tree.links:
-            raise ModelError(f"{tree.path}: {what}: no link {link[:60]!r}; it has {_shortened(tree.links, 400)}")
+            raise ModelError(
+                f"{tree.path}: {what}: no link {link[:60]!r}; it has {_shortened(tree.links, 400)}"
+            )
     first = tree.root if base is None else base
     try:
         last = _required_tip(tree, first) if tip is None else tip
@@ -159,14 +163,18 @@ def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *,
         tip=last,
         joints=joints,
         groups=groups,
-        frozen=_names(joint for joint in tree.joints.values() if not joint.is_fixed and joint not in joints),
+        frozen=_names(
+            joint for joint in tree.joints.values() if not joint.is_fixed and joint not in joints
+        ),
         dropped=dropped,
         zero_poses={link: to_base @ T for link, T in poses.items()},
         notes=tuple(_notes(tree, first, joints, groups, dropped, side)),
     )
 
 
-def _require_no_fault(tree: UrdfTree, joints: Sequence[UrdfJoint], groups: Sequence[Sequence[str]]) -> None:
+def _require_no_fault(
+    tree: UrdfTree, joints: Sequence[UrdfJoint], groups: Sequence[Sequence[str]]
+) -> None:
     """Refuse a chain with a joint or a link that could not be read."""
     links = [tree.links[link] for link in itertools.chain.from_iterable(groups)]
     parts: list[UrdfJoint | UrdfLink] = [*joints, *links]
@@ -207,7 +215,9 @@ def only_tip(tree: UrdfTree, base: str) -> str | None:
     longest = max(tips, key=len, default=())
     tip = tool_frame(tips[longest]) if tips else None
     chains = {*tips, *_mimic_chains(tree, base)}
-    if len(chains) > 1 and (tip not in _CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)):
+    if len(chains) > 1 and (
+        tip not in _CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)
+    ):
         return None
     return tip
 
@@ -238,14 +248,18 @@ def _required_tip(tree: UrdfTree, base: str) -> str:
     others = _mimic_chains(tree, base)
     if not tips:
         if before := _before_mimics(tree, others):
-            listed = ", ".join(f"{link} ({joint} follows another joint)" for link, joint in before.items())
+            listed = ", ".join(
+                f"{link} ({joint} follows another joint)" for link, joint in before.items()
+            )
             raise ModelError(
                 f"every chain has joints that follow others (mimic); choose an end before them (tip): {listed}"
             )
         raise ModelError(f"no moving joints below link {base!r} that do not follow others (mimic)")
     if len(tips) == 1 and not others:
         (leaves,) = tips.values()
-        raise ModelError(f"several frames end the chain: {_shortened(leaves, 400)}; choose one (tip)")
+        raise ModelError(
+            f"several frames end the chain: {_shortened(leaves, 400)}; choose one (tip)"
+        )
     ends = {tool_frame(leaves) or leaves[0]: len(joints) for joints, leaves in tips.items()}
     ends = _branchings(tree, {*tips, *others}) | ends
     texts = [f"{link} ({count} joint{'s' * (count > 1)})" for link, count in ends.items()]
@@ -268,7 +282,9 @@ def _branchings(tree: UrdfTree, chains: Collection[JointNames]) -> dict[str, int
     branchings: dict[str, int] = {}
     for chain in chains:
         for k in range(1, len(chain)):
-            next_joints = {other[k] for other in chains if other[:k] == chain[:k] and len(other) > k}
+            next_joints = {
+                other[k] for other in chains if other[:k] == chain[:k] and len(other) > k
+            }
             if len(next_joints) > 1:
                 branchings[tree.joints[chain[k]].parent] = k
     return branchings
@@ -337,30 +353,45 @@ def _notes(
         if warning.element.name in (names if warning.element.tag == "joint" else links)
     ]
     if len(notes) > BOUNDS.listed_warnings:
-        notes = [*notes[: BOUNDS.listed_warnings], f"and {len(notes) - BOUNDS.listed_warnings} more notes of this kind"]
+        notes = [
+            *notes[: BOUNDS.listed_warnings],
+            f"and {len(notes) - BOUNDS.listed_warnings} more notes of this kind",
+        ]
     others = [joint for joint in tree.joints.values() if joint.name not in names]
     outside: list[UrdfJoint | UrdfLink] = [*others]
     outside += [tree.links[link] for link in tree.links if link not in links]
-    faults = [f"{part.fault}; the chain does not use it" for part in outside if part.fault is not None]
+    faults = [
+        f"{part.fault}; the chain does not use it" for part in outside if part.fault is not None
+    ]
     notes += faults[: BOUNDS.listed_warnings]
     if tree.unconnected:
-        notes.append(f"links that no joint connects with {tree.root!r} left out: {_shortened(tree.unconnected, 300)}")
+        notes.append(
+            f"links that no joint connects with {tree.root!r} left out: {_shortened(tree.unconnected, 300)}"
+        )
     beside = [
         joint.name
         for joint in others
-        if not joint.is_fixed and joint.child != base and (joint.child in links or joint.child in dropped)
+        if not joint.is_fixed
+        and joint.child != base
+        and (joint.child in links or joint.child in dropped)
     ]
     if beside and side == "freeze":
-        notes.append(f"joints off the chain stand at zero, their links carried along: {_shortened(beside, 300)}")
+        notes.append(
+            f"joints off the chain stand at zero, their links carried along: {_shortened(beside, 300)}"
+        )
     notes += [
         f"joint {joint.name!r} follows {joint.mimics!r} in the file; here it stands at zero"
         for joint in others
         if joint.mimics in names and joint.child in links
     ]
     if dropped:
-        notes.append(f"links after joints off the chain left out: {_shortened(sorted(dropped), 300)}")
+        notes.append(
+            f"links after joints off the chain left out: {_shortened(sorted(dropped), 300)}"
+        )
     if base != tree.root:
-        notes.append(f"the world is link {base!r}, with the joints between it and the root {tree.root!r} at zero")
+        notes.append(
+            f"the world is link {base!r}, with the joints between it and the root {tree.root!r} at zero"
+        )
     with_mass = {name for name, link in tree.links.items() if link.inertial is not None}
     massless = [group[0] for group in groups[1:] if with_mass.isdisjoint(group)]
     if massless and with_mass:
@@ -401,9 +432,13 @@ def chain_model(chain: Chain) -> PinocchioModel:
     try:
         model = pin.buildModelFromXML(chain_text(chain))
     except (ValueError, RuntimeError) as error:
-        raise ModelError(f"{chain.path}: Pinocchio refuses the URDF: {' '.join(str(error).split())[:200]}") from None
+        raise ModelError(
+            f"{chain.path}: Pinocchio refuses the URDF: {' '.join(str(error).split())[:200]}"
+        ) from None
     if list(model.names[1:]) != list(chain.names):
-        raise ModelError(f"{chain.path}: joints {', '.join(model.names[1:])}; expected {', '.join(chain.names)}")
+        raise ModelError(
+            f"{chain.path}: joints {', '.join(model.names[1:])}; expected {', '.join(chain.names)}"
+        )
 
     # The model's world is the root. Joint 1 and all frames before it are placed in it, and so is gravity:
     # T_base_x = T_base_root T_root_x and g_base = R_base_root g_root.
@@ -430,7 +465,9 @@ def chain_text(chain: Chain) -> str:
             _make_movable(joint, chain.tree.joints[joint.get("name", "")].axis)
         else:
             joint.set("type", JointKind.FIXED)
-            _remove_all(joint, "axis", "limit", "mimic", "dynamics", "safety_controller", "calibration")
+            _remove_all(
+                joint, "axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"
+            )
     for link in robot.findall("link"):
         if link.get("name") in left_out:
             robot.remove(link)
@@ -466,7 +503,9 @@ def _make_movable(joint: Element, axis: Array) -> None:
     if element is not None and not math.isclose(
         math.hypot(*map(float, element.get("xyz", "1 0 0").split())), 1, rel_tol=0.01
     ):
-        element.set("xyz", " ".join(repr(float(x)) for x in axis))  # squares of long ones overflow in other readers
+        element.set(
+            "xyz", " ".join(repr(float(x)) for x in axis)
+        )  # squares of long ones overflow in other readers
     if joint.get("type") == JointKind.CONTINUOUS:
         joint.set("type", JointKind.REVOLUTE)
     _remove_all(joint, "limit", "safety_controller", "calibration")

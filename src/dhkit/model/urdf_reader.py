@@ -45,7 +45,12 @@ _OWN_PREFIX = "dhkit:"
 _MIN_DIGITS = 3
 """Smallest number of significant digits of a decimal that is taken for a rounded multiple of 15 degrees."""
 _ROUND_SIZES = (("radius", 1), ("length", 1))
-_GEOMETRY_SIZES = {"box": (("size", 3),), "cylinder": _ROUND_SIZES, "capsule": _ROUND_SIZES, "sphere": (("radius", 1),)}
+_GEOMETRY_SIZES = {
+    "box": (("size", 3),),
+    "cylinder": _ROUND_SIZES,
+    "capsule": _ROUND_SIZES,
+    "sphere": (("radius", 1),),
+}
 """Attributes with the sizes of a geometry, and how many numbers each has."""
 _ROUNDED_DECIMALS = range(3, 10)
 """Numbers of decimals of rounded right angles whose differences from the right angle are read as 0."""
@@ -91,9 +96,13 @@ class _UrdfReader:
         parents = _parent_joints(link_elements, joint_elements)
         root, members = _largest_tree(link_elements, joint_elements, parents)
         left_out = tuple(name for name in link_elements if name not in members)
-        link_elements = {name: element for name, element in link_elements.items() if name in members}
+        link_elements = {
+            name: element for name, element in link_elements.items() if name in members
+        }
         joint_elements = {
-            name: element for name, element in joint_elements.items() if child_name(element, "child") in members
+            name: element
+            for name, element in joint_elements.items()
+            if child_name(element, "child") in members
         }
         colors = {}
         for material in robot.findall("material"):
@@ -101,12 +110,19 @@ class _UrdfReader:
             color = _color(material)
             if name and color:
                 colors[name] = color
-        joints = {name: self._joint(ElementName("joint", name), element) for name, element in joint_elements.items()}
+        joints = {
+            name: self._joint(ElementName("joint", name), element)
+            for name, element in joint_elements.items()
+        }
         for joint in joints.values():
             if joint.mimics is not None and joint.mimics not in joints:
-                self._warn(ElementName("joint", joint.name), f" follows {joint.mimics[:60]!r}, which is not a joint")
+                self._warn(
+                    ElementName("joint", joint.name),
+                    f" follows {joint.mimics[:60]!r}, which is not a joint",
+                )
         links = {
-            name: self._link(ElementName("link", name), element, colors) for name, element in link_elements.items()
+            name: self._link(ElementName("link", name), element, colors)
+            for name, element in link_elements.items()
         }
         return UrdfTree(
             path=self.path,
@@ -126,7 +142,9 @@ class _UrdfReader:
 
     def _joint(self, name: ElementName, joint: Element) -> UrdfJoint:
         if joint.get("type", "") not in list(JointKind):
-            raise ModelError(f"{name} is {joint.get('type', '')[:40]!r}; expected one of {', '.join(JointKind)}")
+            raise ModelError(
+                f"{name} is {joint.get('type', '')[:40]!r}; expected one of {', '.join(JointKind)}"
+            )
         kind = JointKind(joint.get("type", ""))
         mimic = joint.find("mimic")
         has_axis = kind in AXIS_KINDS
@@ -136,7 +154,9 @@ class _UrdfReader:
         try:
             if has_axis:
                 damping, friction = _dynamics(name, joint)
-                velocity, effort = (self._largest(name, joint, key) for key in ("velocity", "effort"))
+                velocity, effort = (
+                    self._largest(name, joint, key) for key in ("velocity", "effort")
+                )
                 limits = self._limits(name, joint)
         except ModelError as error:
             fault = str(error)
@@ -162,7 +182,9 @@ class _UrdfReader:
         T = self._origin(where, origin)
         largest = float(np.abs(T[:3, 3]).max())
         if largest > ROBOT_BOUNDS.number:
-            raise ModelError(f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {ROBOT_BOUNDS.number:g}")
+            raise ModelError(
+                f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {ROBOT_BOUNDS.number:g}"
+            )
         return T
 
     def _origin(self, where: str, origin: Element | None) -> Array:
@@ -170,16 +192,22 @@ class _UrdfReader:
         xyz = numbers(where, origin, "xyz", 3) or [0.0] * 3
         if quaternion := numbers(where, origin, "quat_xyzw", 4):  # of URDF 1.2
             if origin is not None and origin.get("rpy") is not None:
-                raise ModelError(f"{where}: <origin> has both rpy and quat_xyzw; expected one of them")
+                raise ModelError(
+                    f"{where}: <origin> has both rpy and quat_xyzw; expected one of them"
+                )
             if abs(math.hypot(*quaternion) - 1) > _QUATERNION_TOLERANCE:
-                raise ModelError(f"{where}: <origin quat_xyzw>: found length {math.hypot(*quaternion):.4g}; expected 1")
+                raise ModelError(
+                    f"{where}: <origin quat_xyzw>: found length {math.hypot(*quaternion):.4g}; expected 1"
+                )
             return pose(xyz, quat=quaternion)
         rpy = numbers(where, origin, "rpy", 3) or [0.0] * 3
         if self.as_designed and origin is not None and any(rpy):
             for i, (word, value) in enumerate(zip(origin.get("rpy", "").split(), rpy, strict=True)):
                 rpy[i] = _designed_angle(word, value)
                 if rpy[i] != value:
-                    self.changes.append(f"{where}: rpy {word} read as {math.degrees(rpy[i]):.6g} degrees")
+                    self.changes.append(
+                        f"{where}: rpy {word} read as {math.degrees(rpy[i]):.6g} degrees"
+                    )
         return pose(xyz, euler=rpy, order="xyz")
 
     def _rounding(self, element: Element | None, key: str) -> float:
@@ -239,9 +267,12 @@ class _UrdfReader:
     def _link(self, name: ElementName, link: Element, colors: Mapping[str, str]) -> UrdfLink:
         try:
             visuals, collisions = (
-                tuple(self._shapes(name, link.findall(tag), colors)) for tag in ("visual", "collision")
+                tuple(self._shapes(name, link.findall(tag), colors))
+                for tag in ("visual", "collision")
             )
-            return UrdfLink(name.name, self._inertial(name, link.find("inertial")), visuals, collisions)
+            return UrdfLink(
+                name.name, self._inertial(name, link.find("inertial")), visuals, collisions
+            )
         except ModelError as error:
             return UrdfLink(name.name, None, (), (), fault=str(error))
 
@@ -254,20 +285,28 @@ class _UrdfReader:
         for key in keys:
             moments += numbers(str(name), inertial.find("inertia"), key, 1)
         if mass is None or len(moments) != len(keys):
-            raise ModelError(f"{name}: <inertial> lacks mass or inertia; expected value, {', '.join(keys)}")
+            raise ModelError(
+                f"{name}: <inertial> lacks mass or inertia; expected value, {', '.join(keys)}"
+            )
         if mass < 0:
             raise ModelError(f"{name}: mass is {mass:g}; expected none below 0")
         xx, yy, zz, xy, yz, xz = moments
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         lowest, *_, highest = np.linalg.eigvalsh(tensor)
         if lowest < -eigenvalue_tolerance(highest):
-            self._warn(name, f": no body has this inertia: a principal moment is {lowest:.3g} kg m^2")
+            self._warn(
+                name, f": no body has this inertia: a principal moment is {lowest:.3g} kg m^2"
+            )
         T = self._origin(f"{name}: inertial", inertial.find("origin"))
         return Inertial(mass, T[:3, 3], T[:3, :3] @ tensor @ T[:3, :3].T)
 
-    def _shapes(self, name: ElementName, elements: Sequence[Element], colors: Mapping[str, str]) -> Iterator[UrdfShape]:
+    def _shapes(
+        self, name: ElementName, elements: Sequence[Element], colors: Mapping[str, str]
+    ) -> Iterator[UrdfShape]:
         if len(elements) > BOUNDS.shape_elements:
-            raise ModelError(f"{name} has {len(elements)} shapes; expected {BOUNDS.shape_elements} at most")
+            raise ModelError(
+                f"{name} has {len(elements)} shapes; expected {BOUNDS.shape_elements} at most"
+            )
         for element in elements:
             T = self._origin(f"{name}: {element.tag}", element.find("origin"))
             color = None
@@ -296,7 +335,10 @@ class _UrdfReader:
                 case "mesh", _:
                     sizes = numbers(where, element, "scale", 3) or [1.0, 1.0, 1.0]
                     if not all(sizes) or not element.get("filename"):
-                        self._warn(name, f": {shape.tag}: a mesh without a file name or with scale 0; left out")
+                        self._warn(
+                            name,
+                            f": {shape.tag}: a mesh without a file name or with scale 0; left out",
+                        )
                         return None, 0.0
                     x, y, z = map(exact, sizes)
                     return Mesh(element.get("filename", ""), (x, y, z)), max(map(abs, sizes))
@@ -338,7 +380,9 @@ def _parent_joints(links: Mapping[str, Element], joints: Mapping[str, Element]) 
                 raise ModelError(f"joint {name!r}: <{tag}> is {link[:60]!r}, which is not a link")
         child = child_name(joint, "child")
         if child in parents:
-            raise ModelError(f"link {child!r} has two parents, by joints {parents[child]!r} and {name!r}")
+            raise ModelError(
+                f"link {child!r} has two parents, by joints {parents[child]!r} and {name!r}"
+            )
         parents[child] = name
     return parents
 
@@ -358,7 +402,9 @@ def _largest_tree(
         trees[root] = set(reached)
     in_a_tree = set(chain.from_iterable(trees.values()))
     if in_a_circle := [link for link in links if link not in in_a_tree]:
-        raise ModelError(f"links {', '.join(in_a_circle)[:200]} go round in a circle; expected a tree")
+        raise ModelError(
+            f"links {', '.join(in_a_circle)[:200]} go round in a circle; expected a tree"
+        )
     root = max(trees, key=lambda link: len(trees[link]))
     return root, trees[root]
 
@@ -368,7 +414,9 @@ def _dynamics(name: ElementName, joint: Element) -> tuple[float, float]:
     dynamics = joint.find("dynamics")
     damping, friction = (number(str(name), dynamics, key) or 0.0 for key in ("damping", "friction"))
     if damping < 0 or friction < 0:
-        raise ModelError(f"{name}: damping {damping:g}, friction {friction:g}; expected none below 0")
+        raise ModelError(
+            f"{name}: damping {damping:g}, friction {friction:g}; expected none below 0"
+        )
     return damping, friction
 
 
@@ -395,10 +443,17 @@ def _designed_angle(word: str, value: float) -> float:
         return multiple
     decimal = Decimal(word)
     _, digits, exponent = decimal.as_tuple()
-    if len(digits) < _MIN_DIGITS or not isinstance(exponent, int) or abs(multiple) > math.tau + 1e-9 or exponent > 0:
+    if (
+        len(digits) < _MIN_DIGITS
+        or not isinstance(exponent, int)
+        or abs(multiple) > math.tau + 1e-9
+        or exponent > 0
+    ):
         return value
     unit = Decimal(1).scaleb(exponent)
-    roundings = (Decimal(multiple).quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN))
+    roundings = (
+        Decimal(multiple).quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN)
+    )
     return multiple if decimal in roundings and multiple else value
 
 
@@ -415,7 +470,11 @@ def _decimal_rounding(word: str) -> float:
     if _is_rounding_of_zero(value):
         return value
     decimal = Decimal(word).as_tuple()
-    if len(decimal.digits) < _MIN_DIGITS or not isinstance(decimal.exponent, int) or decimal.exponent >= 0:
+    if (
+        len(decimal.digits) < _MIN_DIGITS
+        or not isinstance(decimal.exponent, int)
+        or decimal.exponent >= 0
+    ):
         return 0.0
     unit = float(10.0**decimal.exponent)
     multiple = round(value * 12 / math.pi) * math.pi / 12
@@ -424,7 +483,9 @@ def _decimal_rounding(word: str) -> float:
 
 def _is_rounding_of_zero(value: float, rel_tol: float = 1e-3) -> bool:
     """Return whether a number is the difference of a right angle and its decimal: 1.5708 - pi/2 = 3.67e-6."""
-    return abs(value) < 1e-12 or any(math.isclose(abs(value), error, rel_tol=rel_tol) for error in _rounding_errors())
+    return abs(value) < 1e-12 or any(
+        math.isclose(abs(value), error, rel_tol=rel_tol) for error in _rounding_errors()
+    )
 
 
 @lru_cache(maxsize=1)

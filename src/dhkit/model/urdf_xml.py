@@ -18,7 +18,9 @@ from dhkit.model.bounds import BOUNDS
 Element = ElementTree.Element
 
 _RUN_XACRO = "run xacro on it first, and give its output"
-_DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
+_DECLARED_ENCODING = re.compile(
+    rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']"
+)
 _REFUSED_ENCODINGS = {"idna", "punycode"}
 """Encodings of names, not of texts: long ones take quadratic time."""
 
@@ -37,7 +39,9 @@ def parse_urdf(path: Path) -> Element:
     try:
         mode = path.stat().st_mode
         if not stat.S_ISREG(mode):
-            raise ModelError(f"{'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}; expected a URDF")
+            raise ModelError(
+                f"{'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}; expected a URDF"
+            )
         with path.open("rb") as file:
             content = file.read(BOUNDS.urdf_bytes + 1)
     except (OSError, ValueError) as error:
@@ -59,9 +63,16 @@ def parse_urdf(path: Path) -> Element:
 
 def _decoded(content: bytes) -> str:
     """Return the text of an XML file: by its byte order mark, as UTF-8, or in the encoding that it declares."""
-    begins = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", b"<\0": "utf-16-le", b"\0<": "utf-16-be"}
+    begins = {
+        codecs.BOM_UTF16_LE: "utf-16",
+        codecs.BOM_UTF16_BE: "utf-16",
+        b"<\0": "utf-16-le",
+        b"\0<": "utf-16-be",
+    }
     declared = _DECLARED_ENCODING.match(content)
-    encodings = [name for begin, name in begins.items() if content.startswith(begin)] or ["utf-8-sig"]
+    encodings = [name for begin, name in begins.items() if content.startswith(begin)] or [
+        "utf-8-sig"
+    ]
     if declared and declared[1].decode().lower() not in _REFUSED_ENCODINGS:
         encodings.append(declared[1].decode())
     for encoding in encodings:
@@ -69,7 +80,11 @@ def _decoded(content: bytes) -> str:
             return content.decode(encoding)
         except (UnicodeError, LookupError):
             continue
-    said = f"the encoding that it declares is {encodings[-1][:40]}" if declared else "it declares no other encoding"
+    said = (
+        f"the encoding that it declares is {encodings[-1][:40]}"
+        if declared
+        else "it declares no other encoding"
+    )
     raise ModelError(f"not UTF-8 text, and {said}; expected a URDF")
 
 
@@ -94,7 +109,9 @@ class _BoundedTree:
         return self._builder.close()
 
     def _refuse_document_type(self, *_: object) -> None:
-        raise ModelError("has a document type or entities, which a URDF does not need and dhkit does not read")
+        raise ModelError(
+            "has a document type or entities, which a URDF does not need and dhkit does not read"
+        )
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         self._depth += 1
@@ -105,7 +122,9 @@ class _BoundedTree:
             raise ModelError(f"more than {BOUNDS.xml_elements} elements; expected a URDF")
         for key, value in attributes.items():
             if len(value) > BOUNDS.attribute_characters:
-                raise ModelError(f"<{tag[:40]} {key[:40]}> has {len(value)} characters; expected fewer")
+                raise ModelError(
+                    f"<{tag[:40]} {key[:40]}> has {len(value)} characters; expected fewer"
+                )
         self._builder.start(tag, attributes)
 
     def _end(self, tag: str) -> None:
@@ -137,10 +156,14 @@ def numbers(where: str, element: Element | None, key: str, count: int) -> list[f
         value = float(word) if NUMBER.fullmatch(word) else math.nan
         if not math.isfinite(value):
             hint = " (run xacro first)" if "${" in word else ""
-            raise ModelError(f"{where}: <{element.tag} {key}>: found {word[:40]!r}; expected a finite number{hint}")
+            raise ModelError(
+                f"{where}: <{element.tag} {key}>: found {word[:40]!r}; expected a finite number{hint}"
+            )
         values.append(value)
     if len(values) != count:
-        raise ModelError(f"{where}: <{element.tag} {key}> has {len(values)} numbers; expected {count}")
+        raise ModelError(
+            f"{where}: <{element.tag} {key}> has {len(values)} numbers; expected {count}"
+        )
     return values
 
 

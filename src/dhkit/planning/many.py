@@ -61,7 +61,9 @@ def solve_many(
         workers = os.cpu_count() or 1
     check_whole("workers", workers, 1)
     if progress is not None and not callable(progress):
-        raise TypeError(f"progress is {type(progress).__name__}; expected a function of two numbers")
+        raise TypeError(
+            f"progress is {type(progress).__name__}; expected a function of two numbers"
+        )
     report = progress or (lambda done, total: None)
     given = dict(options or {})
     if min(workers, count) <= 1:
@@ -112,7 +114,9 @@ def _begin(planner: OneMotion) -> None:
     _planner[:] = [planner]
 
 
-def _solve(start: Array, goal: Array, warm: Trajectory | None, options: dict[str, Any]) -> Trajectory | PlanningError:
+def _solve(
+    start: Array, goal: Array, warm: Trajectory | None, options: dict[str, Any]
+) -> Trajectory | PlanningError:
     return _solved(_planner[0], start, goal, warm, options)
 
 
@@ -130,8 +134,12 @@ def _similar(warm: object, count: int) -> list[Trajectory | None]:
     """Return a similar motion for each pair: one for all, or one each; results of an earlier call hold errors too."""
     if warm is None or isinstance(warm, Trajectory):
         return [warm] * count
-    if not isinstance(warm, Sequence) or not all(isinstance(one, Trajectory | PlanningError | None) for one in warm):
-        raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory, or a list of them and of None")
+    if not isinstance(warm, Sequence) or not all(
+        isinstance(one, Trajectory | PlanningError | None) for one in warm
+    ):
+        raise TypeError(
+            f"warm is {type(warm).__name__}; expected a Trajectory, or a list of them and of None"
+        )
     if len(warm) != count:
         raise ValueError(f"warm has {len(warm)} motions; expected one, or {count}")
     return [one if isinstance(one, Trajectory) else None for one in warm]
@@ -143,7 +151,10 @@ def _places(values: ArrayLike, n: int, name: str, *, poses: bool) -> Sequence[Ar
     array = number_array(values, name, expected)
     if not array.size:
         raise ValueError(f"{name} has shape {array.shape}: no places; expected {expected}")
-    if array.ndim > 1 and not (finite := np.isfinite(array).reshape(len(array), -1).all(axis=1)).all():
+    if (
+        array.ndim > 1
+        and not (finite := np.isfinite(array).reshape(len(array), -1).all(axis=1)).all()
+    ):
         raise ValueError(f"{name}[{int(np.argmin(finite))}] has values that are not finite")
     if poses and array.shape[-2:] == (4, 4) and array.ndim in (2, 3):
         return list(array.reshape(-1, 4, 4))

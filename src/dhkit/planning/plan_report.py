@@ -123,11 +123,15 @@ class PlanReport:
         """Notes on the motion and its certificate for a reader, a sentence each."""
         notes = []
         if self.coordinates:
-            notes.append(f"of the poses to go to, {', '.join(self.coordinates)} counted and no other coordinates")
+            notes.append(
+                f"of the poses to go to, {', '.join(self.coordinates)} counted and no other coordinates"
+            )
         if self.clearance is not None:
             asked = 1000 * self.clearance
             spare = 1000 * max(self.spare_clearance, 0.0)
-            notes.append(f"clearance: {asked:.3g} mm kept {self.clear_of}, and at least {spare:.3g} mm more")
+            notes.append(
+                f"clearance: {asked:.3g} mm kept {self.clear_of}, and at least {spare:.3g} mm more"
+            )
         if self.reduced_clearances:
             less = ", ".join(self.reduced_clearances)
             where = "all the way" if self.is_clearance_reduced_throughout else "near the ends"
@@ -135,14 +139,24 @@ class PlanReport:
         if self.not_checked:
             notes.append(f"not checked for collisions: {'; '.join(self.not_checked)}")
         if self.failure:
-            path = "the straight path" if self.clearance is None else "a sampled path around the obstacles"
-            notes.append(f"not optimal: {path}, slowed down; the optimizer found nothing ({self.failure})")
+            path = (
+                "the straight path"
+                if self.clearance is None
+                else "a sampled path around the obstacles"
+            )
+            notes.append(
+                f"not optimal: {path}, slowed down; the optimizer found nothing ({self.failure})"
+            )
         elif not self.is_converged:
-            notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
+            notes.append(
+                "not optimal to the solver's tolerance: it stopped at a motion that keeps all limits"
+            )
         if not self.is_resolved:
             notes.append("the move is too small to be optimized: a quintic that keeps the limits")
         elif self.is_duration_given and self.is_least_time:
-            notes.append("the duration is given, so that least time has no choice left: one of many such motions")
+            notes.append(
+                "the duration is given, so that least time has no choice left: one of many such motions"
+            )
         return notes
 
     @property
@@ -176,7 +190,10 @@ class PlanReport:
     def active_limits(self) -> list[tuple[str, float]]:
         """Return the active limits and their shares of time, the most active first."""
         named = [
-            (f"{limit.what} of {self.joints[limit.row]}" if limit.of_joint else limit.what, limit.share)
+            (
+                f"{limit.what} of {self.joints[limit.row]}" if limit.of_joint else limit.what,
+                limit.share,
+            )
             for limit in self.certificate.active
         ]
         return sorted(named, key=lambda item: -item[1])
@@ -185,8 +202,13 @@ class PlanReport:
         return repr_line("PlanReport", summary=f"{self.title}, {self._certified}")
 
     def _repr_html_(self) -> str:
-        facts = [("duration", seconds_text(self.duration)), (f"cost ({self.objective})", self.cost_text)]
-        facts.append(("some limit is active", f"{100 * self.certificate.any_active:.0f} % of the time"))
+        facts = [
+            ("duration", seconds_text(self.duration)),
+            (f"cost ({self.objective})", self.cost_text),
+        ]
+        facts.append(
+            ("some limit is active", f"{100 * self.certificate.any_active:.0f} % of the time")
+        )
         facts += [
             (f"{name} active", f"{100 * share:.0f} % of the time")
             for name, share in self.active_limits()[:MAX_LISTED_LIMITS]
@@ -197,21 +219,31 @@ class PlanReport:
             facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.3g} %"))
         if self.coarse is not None:
             facts.append((f"{self.coarse[0]} intervals cost", more_text(self.sensitivity or 0.0)))
-        facts += [(f"{name}, straight joint path", ", ".join(filter(None, of))) for name, *of in self.comparisons]
+        facts += [
+            (f"{name}, straight joint path", ", ".join(filter(None, of)))
+            for name, *of in self.comparisons
+        ]
         facts.append(("solved in", f"{self.solve_seconds:.3f} s, {self.iterations} iterations"))
         branches = [
-            (branch.branch, _duration_text(branch), "chosen" if branch.chosen else "") for branch in self.branches
+            (branch.branch, _duration_text(branch), "chosen" if branch.chosen else "")
+            for branch in self.branches
         ]
         return html_block(
             f"{self.title}, {self._certified}",
             html_table((), facts),
             html_table(("branch", "duration", ""), branches) if branches else "",
-            html_lines([f"tightened: {', '.join(self.tightened)}"] * bool(self.tightened) + self.notes),
+            html_lines(
+                [f"tightened: {', '.join(self.tightened)}"] * bool(self.tightened) + self.notes
+            ),
         )
 
     @property
     def _certified(self) -> str:
-        return "certified" if self.certificate.ok else f"exceeds a limit by {100 * self.certificate.violation:.2g} %"
+        return (
+            "certified"
+            if self.certificate.ok
+            else f"exceeds a limit by {100 * self.certificate.violation:.2g} %"
+        )
 
     def as_dict(self) -> dict[str, object]:
         """Return the report as numbers and texts, for JSON."""
@@ -250,7 +282,9 @@ class PlanReport:
             "slow_down": self.slow_down,
             "tightened": list(self.tightened),
             "intervals": self.intervals,
-            "coarse": None if self.coarse is None else {"intervals": self.coarse[0], "cost": self.coarse[1]},
+            "coarse": None
+            if self.coarse is None
+            else {"intervals": self.coarse[0], "cost": self.coarse[1]},
             "classical_s": {motion.name: motion.duration for motion in self.classical},
             "classical_cost": {motion.name: motion.cost for motion in self.classical},
             "branches": [
@@ -283,16 +317,25 @@ class PlanReport:
                 f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
             )
         if certificate.sampled:
-            lines.append(f"checked at these states, and not proved between them: {', '.join(certificate.sampled)}")
+            lines.append(
+                f"checked at these states, and not proved between them: {', '.join(certificate.sampled)}"
+            )
         if self.slow_down > 1:
-            lines.append(f"slowed down by {100 * (self.slow_down - 1):.3g} % to keep its limits between knots")
+            lines.append(
+                f"slowed down by {100 * (self.slow_down - 1):.3g} % to keep its limits between knots"
+            )
         if self.tightened:
             lines.append(f"solved again with tightened limits: {', '.join(self.tightened)}")
         active = (
-            ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.active_limits()[:MAX_LISTED_LIMITS])
+            ", ".join(
+                f"{name} {100 * share:.0f} %"
+                for name, share in self.active_limits()[:MAX_LISTED_LIMITS]
+            )
             or "none"
         )
-        lines.append(f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}")
+        lines.append(
+            f"some limit is active in {100 * certificate.any_active:.0f} % of the time: {active}"
+        )
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
         lines += self.notes
@@ -325,7 +368,10 @@ def more_text(share: float) -> str:
 
 def _duration_text(branch: BranchReport) -> str:
     """Return a branch's duration as text, or the reason why it has none."""
-    return branch.reason or f"{'' if branch.solved else 'not tried, at least '}{seconds_text(branch.duration)}"
+    return (
+        branch.reason
+        or f"{'' if branch.solved else 'not tried, at least '}{seconds_text(branch.duration)}"
+    )
 
 
 def report_of(task: Task, best: PlannedMotion, work: Work) -> PlanReport:
@@ -376,7 +422,9 @@ def classical_motions(task: Task) -> tuple[ClassicalMotion, ...]:
     motions = []
     for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):
         try:
-            motion = make(task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques)
+            motion = make(
+                task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques
+            )
         except PlanningError:
             continue  # the straight path may need more than the torque limits
         if task.duration is not None:

@@ -49,7 +49,14 @@ from dhkit.planning.request import (
     require_possible,
     smoothed,
 )
-from dhkit.planning.search import FINER, RESOLUTION, MotionSearch, PlannedMotion, coarser, motion_around
+from dhkit.planning.search import (
+    FINER,
+    RESOLUTION,
+    MotionSearch,
+    PlannedMotion,
+    coarser,
+    motion_around,
+)
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
@@ -132,11 +139,17 @@ class Planner:
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
         self.constraints = checked_constraints(constraints)
-        usual = SMALL_ARM_SIZE // description.n if description.n <= SMALL_ARM_JOINTS else DEFAULT_INTERVALS
+        usual = (
+            SMALL_ARM_SIZE // description.n
+            if description.n <= SMALL_ARM_JOINTS
+            else DEFAULT_INTERVALS
+        )
         # Smooth objectives need half as many intervals: their accelerations are parabolas. Meshes of arms of few joints
         # are fine enough for half of them to find least energy, whose torques jump.
         self._requested_intervals = intervals
-        has_jumps = self.objective.has_time or (not self.objective.is_smooth and description.n > SMALL_ARM_JOINTS)
+        has_jumps = self.objective.has_time or (
+            not self.objective.is_smooth and description.n > SMALL_ARM_JOINTS
+        )
         self.intervals = intervals or (usual if has_jumps else usual // 2)
         self.friction = smoothed(Friction.chosen(friction))
         self._programs: dict[tuple[object, ...], MotionProgram] = {}
@@ -150,7 +163,8 @@ class Planner:
 
     def __repr__(self) -> str:
         return repr_line(
-            f"Planner of {self.description.name}", summary=f"least {self.objective}, {self.intervals} intervals"
+            f"Planner of {self.description.name}",
+            summary=f"least {self.objective}, {self.intervals} intervals",
         )
 
     def solve(
@@ -204,11 +218,19 @@ class Planner:
             task, best, branches = self._best(request, routes, chosen.warm, work, chosen.progress)
         except PlanningError as error:
             raise self._with_reason(error, request, routes, work) from None
-        report = replace(report_of(task, best, work), branches=branches, coordinates=tuple(chosen.coordinates or ()))
+        report = replace(
+            report_of(task, best, work),
+            branches=branches,
+            coordinates=tuple(chosen.coordinates or ()),
+        )
         is_choice = task.duration is None or not self.objective.only_time
         if chosen.compare and best.is_resolved and is_choice:
-            report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, work))
-        return replace(best.trajectory, report=report, payload=chosen.payload, friction=self.friction)
+            report = replace(
+                report, classical=classical_motions(task), coarse=self._coarse(task, best, work)
+            )
+        return replace(
+            best.trajectory, report=report, payload=chosen.payload, friction=self.friction
+        )
 
     def solve_many(
         self,
@@ -242,12 +264,16 @@ class Planner:
         ValueError, TypeError
             Arguments of another shape or type.
         """
-        return solve_many(self, starts, goals, warm=warm, workers=workers, progress=progress, options=options)
+        return solve_many(
+            self, starts, goals, warm=warm, workers=workers, progress=progress, options=options
+        )
 
     # Programs
 
     @delayed_interrupts()
-    def program(self, task: Task, attempt: int = 0, scale: float = 1.0) -> tuple[MotionProgram, float]:
+    def program(
+        self, task: Task, attempt: int = 0, scale: float = 1.0
+    ) -> tuple[MotionProgram, float]:
         """Return the program for a task, and the time for building it now, s.
 
         Parameters
@@ -261,7 +287,9 @@ class Planner:
         limits = task.limits
         jerk_limited = bool(np.isfinite(limits.jerk).any())
         with_torque = bool(np.isfinite(limits.torque).any())
-        intervals = max(MIN_LEG_INTERVALS, int(scale * self.intervals_for(task) * (2 if attempt else 1)))
+        intervals = max(
+            MIN_LEG_INTERVALS, int(scale * self.intervals_for(task) * (2 if attempt else 1))
+        )
         key = (legs, task.is_loaded, jerk_limited, with_torque, intervals, attempt)
         with self._making:
             if key in self._programs:
@@ -292,19 +320,25 @@ class Planner:
     def _curves(self, task: Task) -> tuple[Curve, ...]:
         jerk_counts = bool(np.isfinite(task.limits.jerk).any()) or self.objective.has_jerk
         has_friction = self.friction is not None
-        return curves_for(self.description.n, self.objective, jerk_counts=jerk_counts, friction=has_friction)
+        return curves_for(
+            self.description.n, self.objective, jerk_counts=jerk_counts, friction=has_friction
+        )
 
     def _task(self, request: PlanRequest, points: Array) -> Task:
         description = self.description
         limits = request.limits
         arm = request.loaded(description)
         T_start = world_to_tool(description, points[0])
-        parameters = tuple(constraint.values(description, T_start) for constraint in self.constraints)
+        parameters = tuple(
+            constraint.values(description, T_start) for constraint in self.constraints
+        )
         duration = request.duration
         if duration is None and not self.objective.has_time:
             duration = DEFAULT_DURATION_FACTOR * float(leg_durations(arm, limits, points).sum())
             if not duration > 0:
-                raise PlanningError(f"nothing limits how fast {self.objective} may be: give a duration, or limits")
+                raise PlanningError(
+                    f"nothing limits how fast {self.objective} may be: give a duration, or limits"
+                )
         avoidance = request.avoidance
         if avoidance:
             avoidance = avoidance.between(description, points[0], points[-1])
@@ -335,20 +369,30 @@ class Planner:
         chosen = -1
         for number, route in enumerate(routes):
             # Every motion of the route lasts at least ``bound``; for least time that decides.
-            hopeless = best is not None and self.objective.only_time and route.bound >= best.motion.trajectory.duration
+            hopeless = (
+                best is not None
+                and self.objective.only_time
+                and route.bound >= best.motion.trajectory.duration
+            )
             if hopeless or (best is not None and work.is_over):
                 reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
             try:
-                if route.label:  # a chosen branch; the places of a single route were checked by require_possible
+                if (
+                    route.label
+                ):  # a chosen branch; the places of a single route were checked by require_possible
                     last = len(route.points) - 1
                     for k, point in enumerate(route.points[1:], start=1):
-                        require_place(self.description, request, point, "goal" if k == last else f"via {k}")
+                        require_place(
+                            self.description, request, point, "goal" if k == last else f"via {k}"
+                        )
                 task = self._task(request, route.points)
                 task, found = self._route_motion(task, warm, work, progress)
             except PlanningError as error:
                 failure = failure or error
-                reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
+                reports.append(
+                    BranchReport(route.label, float("inf"), solved=True, reason=str(error))
+                )
                 continue
             reports.append(BranchReport(route.label, found.trajectory.duration, solved=True))
             if best is None or found.cost < best.motion.cost:
@@ -357,9 +401,13 @@ class Planner:
         if best is None:
             if failure is None or len(routes) == 1:
                 raise failure or PlanningError("no motion found")
-            raise PlanningError(f"none of {len(routes)} branches has a motion; the first, {routes[0].label}: {failure}")
+            raise PlanningError(
+                f"none of {len(routes)} branches has a motion; the first, {routes[0].label}: {failure}"
+            )
         reports_of_branches = (
-            tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(routes) > 1 else ()
+            tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports))
+            if len(routes) > 1
+            else ()
         )
         return *best, reports_of_branches
 
@@ -373,7 +421,9 @@ class Planner:
         attempt = 0
         while True:
             program = self._counted_program(task, attempt, work)
-            search = MotionSearch(task.without_obstacles, program, work, progress, is_last=attempt == last)
+            search = MotionSearch(
+                task.without_obstacles, program, work, progress, is_last=attempt == last
+            )
             finer = partial(self._counted_program, task, attempt, work, FINER)
             try:
                 found = replace(search(warm), attempt=attempt)
@@ -389,7 +439,9 @@ class Planner:
                     raise
                 return task, slow
 
-    def _counted_program(self, task: Task, attempt: int, work: Work, scale: float = 1.0) -> MotionProgram:
+    def _counted_program(
+        self, task: Task, attempt: int, work: Work, scale: float = 1.0
+    ) -> MotionProgram:
         """Return the program of a task as :meth:`program` does, and count the time for building it."""
         program, seconds = self.program(task, attempt, scale)
         work.build_seconds += seconds
@@ -402,7 +454,12 @@ class Planner:
         if work.is_over or request.duration is None or len(routes) > 1:
             return error
         quickest = Planner(
-            self.description, "time", request.limits, self.constraints, MIN_DEFAULT_INTERVALS, self.friction or False
+            self.description,
+            "time",
+            request.limits,
+            self.constraints,
+            MIN_DEFAULT_INTERVALS,
+            self.friction or False,
         )
         try:
             task = quickest._task(replace(request, duration=None), routes[0].points)

@@ -15,7 +15,14 @@ LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "inches": 1 / 0.0254}
 """Units of length that programs may use instead of metres, and how many a metre has."""
 POSE_TOLERANCE = 1e-6
 """Largest difference of poses that agree: entries of rotations, and positions as shares of the arm's reach."""
-_FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
+_FATAL = {
+    Failure.LATE,
+    Failure.MEMORY,
+    Failure.PROCESSES,
+    Failure.FILES,
+    Failure.ENDED,
+    Failure.GARBAGE,
+}
 
 
 class Caller:
@@ -49,7 +56,10 @@ class Caller:
         if self._fatal >= BOUNDS.fatal_failures:
             raise ProgramError("not called any more", Failure.ENDED)
         processor = self.program.processor_time - self._processor_begun
-        if processor > BOUNDS.time or time.perf_counter() - self._begun > WAITING_FACTOR * BOUNDS.time:
+        if (
+            processor > BOUNDS.time
+            or time.perf_counter() - self._begun > WAITING_FACTOR * BOUNDS.time
+        ):
             self.failures[f"scoring took longer than {BOUNDS.time:g} s: not called any more"] = 1
             raise ProgramError("not called any more", Failure.LATE)
         begin = time.perf_counter()

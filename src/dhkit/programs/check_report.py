@@ -83,7 +83,9 @@ class CheckReport:
         for function, parts in self.functions.items():
             lines += ["", function]
             for part in parts:
-                lines.append(f"  {part.name:<10} {f'{part.points:.3g} of {part.most:g}':>12}   {part.text}")
+                lines.append(
+                    f"  {part.name:<10} {f'{part.points:.3g} of {part.most:g}':>12}   {part.text}"
+                )
                 lines += [f"  {'':<10} {'':>12}     {detail}" for detail in part.details]
         lines += [""] * bool(self.notes) + [f"note: {note}" for note in self.notes]
         return "\n".join([*lines, f"random states: seed {self.seed}"])
@@ -99,7 +101,9 @@ class CheckReport:
                 points = f"{part.points:.3g} of {part.most:g}"
                 rows.append((function, part.name, points, part.text))
         title = f"{self.program} against {self.robot}: {self.points:g} of {self.most:g} points"
-        return html_block(title, html_table(("function", "part", "points", ""), rows), html_lines(self.notes))
+        return html_block(
+            title, html_table(("function", "part", "points", ""), rows), html_lines(self.notes)
+        )
 
 
 def share_within(value: float, bound: float) -> float:

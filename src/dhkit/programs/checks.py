@@ -72,18 +72,26 @@ def check(
         progress(name)
         if name not in program.functions:
             most = sum(rubric.points(name).values())
-            functions[name] = (Part("defined", 0.0, most, f"{program.name} does not define {name}"),)
+            functions[name] = (
+                Part("defined", 0.0, most, f"{program.name} does not define {name}"),
+            )
             continue
         rng = np.random.default_rng([seed, len(functions)])
         score = {"fk": _score_forward, "ik": score_inverse, "controller": _score_controller}[name]
         functions[name] = tuple(score(arm, Caller(program, name), rubric, rng, samples))
     notes = [f"{program.name} imports {module}" for module in program.imported]
     if not program.isolation:
-        notes.append(f"{program.name} was {program.isolation}: it may have used dhkit in ways that are not seen")
+        notes.append(
+            f"{program.name} was {program.isolation}: it may have used dhkit in ways that are not seen"
+        )
     other = {"fk": "ik", "ik": "fk"}
-    absent = [other[name] for name in scored if name in other and other[name] not in program.functions]
+    absent = [
+        other[name] for name in scored if name in other and other[name] not in program.functions
+    ]
     if absent and rubric.named == ():
-        notes.append(f"{program.name} does not define {absent[0]}: a rubric that names it asks for it")
+        notes.append(
+            f"{program.name} does not define {absent[0]}: a rubric that names it asks for it"
+        )
     return CheckReport(arm.name, program.name, functions, tuple(notes), seed)
 
 
@@ -97,7 +105,9 @@ def _score_forward(
     states = random_states(arm, rng, samples)
     truth = arm.fk(states)
     poses = [_pose(call, q) for q in states]
-    errors = np.array([np.inf if T is None else _pose_error(arm, T, truth[k]) for k, T in enumerate(poses)])
+    errors = np.array(
+        [np.inf if T is None else _pose_error(arm, T, truth[k]) for k, T in enumerate(poses)]
+    )
     agrees = errors < POSE_TOLERANCE
     most = rubric.points("fk")["agrees"]
     text = f"{agrees.sum()} of {samples} poses agree"
@@ -105,7 +115,11 @@ def _score_forward(
     if not agrees.all() and not details:
         k = int(np.argmin(agrees))
         returned = np.array([T for T in poses if T is not None])
-        hint = _pose_hint(returned, float(errors.max())) or _unit_hint(poses, truth) or _axis_hint(arm, call, rng)
+        hint = (
+            _pose_hint(returned, float(errors.max()))
+            or _unit_hint(poses, truth)
+            or _axis_hint(arm, call, rng)
+        )
         details = (f"first at q = {listed(states[k])}", *hint)
     yield Part("agrees", most * agrees.mean(), most, text, details)
 
@@ -133,7 +147,9 @@ def _pose_hint(poses: Array, error: float) -> tuple[str, ...]:
     if np.abs(poses[:, 3] - [0, 0, 0, 1]).max() > POSE_TOLERANCE:
         return ("its last row is not 0 0 0 1",)
     if error < _MAX_ROUNDING:
-        return (f"it differs by {error:.1g} at most: are its numbers rounded? {POSE_TOLERANCE:g} is allowed",)
+        return (
+            f"it differs by {error:.1g} at most: are its numbers rounded? {POSE_TOLERANCE:g} is allowed",
+        )
     skew = float(np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max())
     if skew > _MAX_ROUNDING or np.any(np.linalg.det(R) < 0):
         return (
@@ -152,7 +168,10 @@ def _unit_hint(poses: Sequence[Array | None], truth: Array) -> tuple[str, ...]:
         return ()
     size = float(np.abs(ours[:, :3, 3]).max())
     for unit, factor in LENGTH_UNITS.items():
-        if size > 0 and np.abs(theirs[:, :3, 3] / factor - ours[:, :3, 3]).max() < POSE_TOLERANCE * size:
+        if (
+            size > 0
+            and np.abs(theirs[:, :3, 3] / factor - ours[:, :3, 3]).max() < POSE_TOLERANCE * size
+        ):
             return (f"its positions are in {unit}; expected m",)
     return ()
 
@@ -174,7 +193,9 @@ def _axis_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, .
         ours = arm.fk(moved) @ np.linalg.inv(arm.fk(q))
         if np.abs(theirs @ np.linalg.inv(start) - ours).max() > POSE_TOLERANCE:
             place = f"row {i}" if i else "the base"
-            return (f"joint {i + 1} ({joint.name}) is the first whose axis is wrong: look at {place} and its own sign",)
+            return (
+                f"joint {i + 1} ({joint.name}) is the first whose axis is wrong: look at {place} and its own sign",
+            )
     return ("every joint's axis is right: look at the last row and the tool",)
 
 
@@ -195,7 +216,11 @@ def _score_controller(
         result = arm.simulate(call, motion, rate=task.rate, plant=plant)
     except DhkitError as error:
         yield Part(
-            "follows", 0.0, most, "the run failed", (*call.failure_texts(), str(error))[: BOUNDS.listed_failures]
+            "follows",
+            0.0,
+            most,
+            "the run failed",
+            (*call.failure_texts(), str(error))[: BOUNDS.listed_failures],
         )
         return
     errors = np.abs(result.q - result.reference_q)
@@ -210,16 +235,24 @@ def _score_controller(
 
 def _ends(arm: Arm, start: str, goal: str) -> tuple[Array, Array]:
     """Return two configurations by name, shape (n,) each; if they are the same, the second is moved."""
-    known = {"zero": np.zeros(arm.n)} | {name: np.array(q) for name, q in arm.configurations.items()}
+    known = {"zero": np.zeros(arm.n)} | {
+        name: np.array(q) for name, q in arm.configurations.items()
+    }
     # The default task begins in "ready", which not every arm has.
     known.setdefault(ControllerTask.start, known["zero"])
     for key, name in (("start", start), ("goal", goal)):
         if name not in known:
-            raise AnswerError(f"controller.{key}: {arm.name} has no configuration {name!r}; it has {', '.join(known)}")
+            raise AnswerError(
+                f"controller.{key}: {arm.name} has no configuration {name!r}; it has {', '.join(known)}"
+            )
     first, second = known[start], known[goal]
     if np.abs(second - first).max() > _SAME_STATE:
         return first, second
     numbers = arm.description.numbers
-    room = np.where(numbers.upper - first >= first - numbers.lower, numbers.upper - first, numbers.lower - first)
-    distance = np.where(numbers.prismatic, _MAX_MOTION * (arm.description.reach or 1.0), _MAX_MOTION)
+    room = np.where(
+        numbers.upper - first >= first - numbers.lower, numbers.upper - first, numbers.lower - first
+    )
+    distance = np.where(
+        numbers.prismatic, _MAX_MOTION * (arm.description.reach or 1.0), _MAX_MOTION
+    )
     return first, first + np.clip(room / 2, -distance, distance)

@@ -17,7 +17,12 @@ from dhkit.kinematics import classify
 from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
 from dhkit.programs.check_report import Part, share_within
-from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
+from dhkit.programs.random_poses import (
+    poses_out_of_reach,
+    random_states,
+    regular_states,
+    singular_states,
+)
 from dhkit.programs.rubric import CheckRubric
 
 _SAME_SOLUTION = 1e-5
@@ -48,17 +53,25 @@ def score_inverse(
     has_closed_form = classify(arm.description).fit is not None
     singular = singular_states(arm, rng, max(min(samples, _MIN_SINGULAR_POSES), samples // 10))
     # Points of parts that this arm does not have are added to those of "closes".
-    spare = (0.0 if has_closed_form else points["branches"]) + (0.0 if len(singular) else points["singular"])
+    spare = (0.0 if has_closed_form else points["branches"]) + (
+        0.0 if len(singular) else points["singular"]
+    )
     judge = _PoseJudge(arm, call, has_closed_form)
     regular = [judge.solve(T) for T in arm.fk(regular_states(arm, rng, samples))]
     seconds = np.median(call.seconds) if call.seconds else np.inf
     unreachable = poses_out_of_reach(arm, rng, max(1, round(_OUT_OF_REACH_SHARE * samples)))
-    empty = [judge.returns_nothing(T) for T in unreachable]  # none where an unlimited slide reaches everything
+    empty = [
+        judge.returns_nothing(T) for T in unreachable
+    ]  # none where an unlimited slide reaches everything
     right = [pose.is_right for pose in regular]
     # A program that returns nothing for any pose has not recognised those out of reach.
     share = float(np.mean([*right, *empty])) if any(right) else 0.0
     text = f"{sum(right)} of {len(regular)} poses are met by every solution returned; "
-    text += f"{sum(empty)} of {len(empty)} out of reach are empty" if len(empty) else "none is out of reach"
+    text += (
+        f"{sum(empty)} of {len(empty)} out of reach are empty"
+        if len(empty)
+        else "none is out of reach"
+    )
     worth = points["closes"] + spare
     if not any(right):
         judge.try_units(arm.fk(regular_states(arm, rng, _UNIT_POSES)))
@@ -68,13 +81,33 @@ def score_inverse(
     if len(singular):
         right_singular = [judge.solve(T).is_right for T in arm.fk(singular)]
         text = f"{sum(right_singular)} of {len(right_singular)} singular poses are met"
-        yield Part("singular", points["singular"] * float(np.mean(right_singular)), points["singular"], text)
+        yield Part(
+            "singular",
+            points["singular"] * float(np.mean(right_singular)),
+            points["singular"],
+            text,
+            _singular_example(singular, right_singular),
+        )
     limit = rubric.ik.seconds
     share = float(np.mean(right))
-    text = f"{1e3 * seconds:.3g} ms a pose; {1e3 * limit:g} ms are asked for" if np.isfinite(seconds) else "no answer"
+    text = (
+        f"{1e3 * seconds:.3g} ms a pose; {1e3 * limit:g} ms are asked for"
+        if np.isfinite(seconds)
+        else "no answer"
+    )
     if share < 1:
         text += f"; counts for the {100 * share:.0f} % of the poses that are met"
-    yield Part("time", points["time"] * share_within(float(seconds), limit) * share, points["time"], text)
+    yield Part(
+        "time", points["time"] * share_within(float(seconds), limit) * share, points["time"], text
+    )
+
+
+def _singular_example(singular: Array, is_right: Sequence[bool]) -> tuple[str, ...]:
+    """Return a line with the first singular state whose pose is not met, for a person to try."""
+    for q, met in zip(singular, is_right, strict=True):
+        if not met:
+            return (f"for example the pose fk({listed(q)}) is not met",)
+    return ()
 
 
 @dataclass(frozen=True)
@@ -116,7 +149,9 @@ class _PoseJudge:
         fit = self._classification.fit
         q = random_states(arm, np.random.default_rng(0), 1)[0]
         position_decides = np.linalg.matrix_rank(arm.jacobian(q)[:3], _RANK_TOLERANCE) == arm.n
-        self._position_only = fit is not None and set(fit.coordinates) <= {"x", "y", "z"} and bool(position_decides)
+        self._position_only = (
+            fit is not None and set(fit.coordinates) <= {"x", "y", "z"} and bool(position_decides)
+        )
         """Whether solutions must meet the position alone, which decides all joints; otherwise the whole pose."""
         self._errors: Counter[str] = Counter()
         self._example = ""
@@ -129,7 +164,11 @@ class _PoseJudge:
         solutions, is_complete = self._solutions(T)
         truth = self.arm.ik(T) if self.has_closed_form else None
         true_q = np.zeros((0, self.arm.n)) if truth is None else truth.q[truth.valid]
-        names = [] if truth is None else [name for name, v in zip(truth.branches, truth.valid, strict=True) if v]
+        names = (
+            []
+            if truth is None
+            else [name for name, v in zip(truth.branches, truth.valid, strict=True) if v]
+        )
         if solutions is None or not len(solutions):
             self._unsolved += solutions is not None
             return _SolvedPose(False, missing=tuple(names))
@@ -159,10 +198,14 @@ class _PoseJudge:
             scaled[:, :3, 3] *= factor
             answers = [self._solutions(T)[0] for T in scaled]
             if all(
-                rows is not None and len(rows) and self._pose_error(rows[0] * scale, T) < POSE_TOLERANCE
+                rows is not None
+                and len(rows)
+                and self._pose_error(rows[0] * scale, T) < POSE_TOLERANCE
                 for rows, T in zip(answers, poses, strict=True)
             ):
-                self._errors[f"it meets the poses when their positions are given in {unit}; expected m"] += len(poses)
+                self._errors[
+                    f"it meets the poses when their positions are given in {unit}; expected m"
+                ] += len(poses)
                 return
 
     def returns_nothing(self, T: Array) -> bool:
@@ -171,14 +214,26 @@ class _PoseJudge:
         if solutions is None or not is_complete:
             return False
         if len(solutions):
-            self._errors["solutions were returned for poses that are out of reach; expected none"] += 1
+            self._errors[
+                "solutions were returned for poses that are out of reach; expected none"
+            ] += 1
         return not len(solutions)
 
     def details(self) -> tuple[str, ...]:
         """Return the program's errors, the most frequent first, and an example."""
-        errors = [f"{text} ({count} poses)" for text, count in self._errors.most_common(BOUNDS.listed_failures)]
-        unsolved = [f"no solution for {self._unsolved} poses that are in reach"] if self._unsolved else []
-        return (*self.call.failure_texts(), *errors, *unsolved, *([self._example] if self._example else []))
+        errors = [
+            f"{text} ({count} poses)"
+            for text, count in self._errors.most_common(BOUNDS.listed_failures)
+        ]
+        unsolved = (
+            [f"no solution for {self._unsolved} poses that are in reach"] if self._unsolved else []
+        )
+        return (
+            *self.call.failure_texts(),
+            *errors,
+            *unsolved,
+            *([self._example] if self._example else []),
+        )
 
     def _solutions(self, T: Array) -> tuple[Array | None, bool]:
         """Return the finite solutions of a pose, shape (B, n), None if the call failed; and whether all are finite."""
@@ -224,5 +279,13 @@ def _branches_part(regular: Sequence[_SolvedPose], most: float) -> Part:
     missing = Counter(chain.from_iterable(pose.missing for pose in regular))
     total = found.total() + missing.total()
     share = found.total() / total if total else 0.0
-    never_found = tuple(f"never found: {name}" for name in missing if name not in found) if found else ()
-    return Part("branches", most * share, most, f"{found.total()} of {total} solutions are found", never_found)
+    never_found = (
+        tuple(f"never found: {name}" for name in missing if name not in found) if found else ()
+    )
+    return Part(
+        "branches",
+        most * share,
+        most,
+        f"{found.total()} of {total} solutions are found",
+        never_found,
+    )

@@ -47,12 +47,18 @@ class Program:
     """
 
     def __init__(
-        self, source: str | Path | Sequence[str], limits: Limits | None = None, isolation: Isolation | None = None
+        self,
+        source: str | Path | Sequence[str],
+        limits: Limits | None = None,
+        isolation: Isolation | None = None,
     ) -> None:
         self.limits = limits or Limits()
         self.isolation = find_isolation() if isolation is None else isolation
         self._child = Child(
-            Path(source) if isinstance(source, str) else source, FUNCTION_RUNNERS, self.limits, self.isolation
+            Path(source) if isinstance(source, str) else source,
+            FUNCTION_RUNNERS,
+            self.limits,
+            self.isolation,
         )
         self.name = self._child.name
         self.functions: tuple[str, ...] = ()
@@ -66,7 +72,11 @@ class Program:
             The program cannot be loaded.
         """
         functions = self._child.start()["functions"]
-        if not isinstance(functions, list) or not set(map(str, functions)) <= set(FUNCTIONS) or not functions:
+        if (
+            not isinstance(functions, list)
+            or not set(map(str, functions)) <= set(FUNCTIONS)
+            or not functions
+        ):
             raise self._child.refuse(f"{self.name} defines none of {', '.join(FUNCTIONS)}")
         self.functions = tuple(map(str, functions))
 
@@ -118,10 +128,13 @@ class Program:
         """
         rows = _numbers("ik", self.call("ik", T=T.tolist()))
         if rows.size and (rows.ndim > 2 or rows.shape[-1] != n):
-            raise ProgramError(f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", Failure.RAISED)
+            raise ProgramError(
+                f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", Failure.RAISED
+            )
         if rows.size > BOUNDS.solutions * n:
             raise ProgramError(
-                f"ik returned {rows.size // n} solutions; expected at most {BOUNDS.solutions}", Failure.RAISED
+                f"ik returned {rows.size // n} solutions; expected at most {BOUNDS.solutions}",
+                Failure.RAISED,
             )
         return rows.reshape(-1, n)
 
@@ -133,8 +146,12 @@ class Program:
         ProgramError
             The call failed, or returned something else.
         """
-        to_follow = {name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")}
-        torques = self.call("controller", t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=to_follow)
+        to_follow = {
+            name: np.asarray(getattr(setpoint, name)).tolist() for name in ("q", "qd", "qdd")
+        }
+        torques = self.call(
+            "controller", t=float(t), q=q.tolist(), qd=qd.tolist(), setpoint=to_follow
+        )
         return _numbers("controller", torques)
 
     @property
@@ -177,4 +194,6 @@ def _numbers(function: str, value: object) -> Array:
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise ProgramError(f"{function} returned a value that is not an array of numbers", Failure.RAISED) from None
+        raise ProgramError(
+            f"{function} returned a value that is not an array of numbers", Failure.RAISED
+        ) from None

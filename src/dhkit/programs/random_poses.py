@@ -36,7 +36,9 @@ def _singular_value_ratio(arm: Arm, q: Array) -> float:
 def regular_states(arm: Arm, rng: np.random.Generator, count: int) -> Array:
     """Return random joint values inside the limits, away from singular ones, shape (count, n), rad and m."""
     states = random_states(arm, rng, _TRIES * count)
-    regular = list(islice((q for q in states if _singular_value_ratio(arm, q) > _MIN_REGULAR_RATIO), count))
+    regular = list(
+        islice((q for q in states if _singular_value_ratio(arm, q) > _MIN_REGULAR_RATIO), count)
+    )
     return np.array(regular) if regular else random_states(arm, rng, count)
 
 

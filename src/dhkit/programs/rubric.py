@@ -106,9 +106,13 @@ class CheckRubric:
             The file cannot be read, or is not a rubric.
         """
         try:
-            data = plain_numbers(toml_document(read_bounded(path, BOUNDS.rubric_bytes, "a rubric").decode()))
+            data = plain_numbers(
+                toml_document(read_bounded(path, BOUNDS.rubric_bytes, "a rubric").decode())
+            )
         except (DescriptionError, UnicodeDecodeError) as error:
-            raise AnswerError(f"{path}: {error}" if isinstance(error, UnicodeDecodeError) else str(error)) from None
+            raise AnswerError(
+                f"{path}: {error}" if isinstance(error, UnicodeDecodeError) else str(error)
+            ) from None
         return cls.from_dict(data, f"{path}: ")
 
     @classmethod
@@ -135,11 +139,15 @@ class CheckRubric:
         """Return the points of each part of a function's score."""
         return {
             "fk": {"agrees": self.fk.agrees},
-            "ik": {name: getattr(self.ik, name) for name in ("closes", "branches", "singular", "time")},
+            "ik": {
+                name: getattr(self.ik, name) for name in ("closes", "branches", "singular", "time")
+            },
             "controller": {"follows": self.controller.follows},
         }[function]
 
     def __repr__(self) -> str:
         functions = self.scored_functions(("fk", "ik", "controller"))
-        points = ", ".join(f"{function} {sum(self.points(function).values()):g}" for function in functions)
+        points = ", ".join(
+            f"{function} {sum(self.points(function).values()):g}" for function in functions
+        )
         return repr_line("CheckRubric", summary=f"points of {points}")

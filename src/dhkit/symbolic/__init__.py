@@ -12,7 +12,11 @@ register_formats("dhkit.symbolic.equations.sympy_objects", "equations_sympy")
 register_formats("dhkit.symbolic.equations.python_code", "equations_python", "inverse_python")
 register_formats("dhkit.symbolic.equations.c_code", "equations_c", "inverse_c")
 register_formats("dhkit.symbolic.equations.matlab_code", "equations_matlab", "inverse_matlab")
-register_formats("dhkit.symbolic.equations.quantities", "readable", "quantities", "kinematic_quantities")
-register_formats("dhkit.symbolic.equations.inverse_text", "inverse_text", "inverse_latex", "inverse_table")
+register_formats(
+    "dhkit.symbolic.equations.quantities", "readable", "quantities", "kinematic_quantities"
+)
+register_formats(
+    "dhkit.symbolic.equations.inverse_text", "inverse_text", "inverse_latex", "inverse_table"
+)
 register_formats("dhkit.symbolic.equations.inverse_page", "inverse_page")
 register_formats("dhkit.symbolic.equations.inverse_sympy", "inverse_sympy")

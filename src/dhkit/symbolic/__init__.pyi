@@ -30,7 +30,10 @@ from .differentiable.friction import (
     friction_parameters as friction_parameters,
     friction_torque as friction_torque,
 )
-from .differentiable.inertial_table import InertialTable as InertialTable, inertial_pattern as inertial_pattern
+from .differentiable.inertial_table import (
+    InertialTable as InertialTable,
+    inertial_pattern as inertial_pattern,
+)
 from .differentiable.moments import Moments as Moments
 from .differentiable.recursive import (
     recursive_bias as recursive_bias,
@@ -38,7 +41,10 @@ from .differentiable.recursive import (
     recursive_inverse_dynamics as recursive_inverse_dynamics,
 )
 from .differentiable.velocity_regressor import velocity_regressor as velocity_regressor
-from .exact.base_parameters import BaseParameters as BaseParameters, base_parameters as base_parameters
+from .exact.base_parameters import (
+    BaseParameters as BaseParameters,
+    base_parameters as base_parameters,
+)
 from .exact.exact_arm import ExactArm as ExactArm, exact_arm as exact_arm
 from .exact.lagrangian import Lagrangian as Lagrangian, Proof as Proof, lagrangian as lagrangian
 from .exact.naming import Symbols as Symbols
@@ -55,7 +61,12 @@ from .kinematics import (
     symbolic_kinematics as symbolic_kinematics,
 )
 from .mistakes import MISTAKES as MISTAKES, MadeAt as MadeAt, Mistake as Mistake, Subject as Subject
-from .programs.graph import Graph as Graph, Node as Node, Variable as Variable, operation_count as operation_count
+from .programs.graph import (
+    Graph as Graph,
+    Node as Node,
+    Variable as Variable,
+    operation_count as operation_count,
+)
 from .programs.printers import c_source as c_source, export_c as export_c
 from .ring.elements import Element as Element, Elements as Elements, RingError as RingError
 from .textbook import TextbookDerivation as TextbookDerivation, derive as derive

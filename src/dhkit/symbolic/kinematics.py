@@ -73,7 +73,11 @@ class SymbolicMatrix:
         return f"<{self.name} of {self.kinematics.description.name}, shape {self.elements.shape}>"
 
     def _repr_latex_(self) -> str | None:
-        return self.latex() if sum(len(element) for element in self.elements.flat) <= READABLE else None
+        return (
+            self.latex()
+            if sum(len(element) for element in self.elements.flat) <= READABLE
+            else None
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -210,7 +214,11 @@ class SymbolicKinematics:
         names = [*(f"A{i}" for i in range(1, self.n + 1)), "T", "J"]
         if name not in names:
             raise ValueError(f"no quantity {name!r}; expected one of {', '.join(names)}")
-        matrix = self.derivation.A[int(name[1:]) - 1] if name.startswith("A") else getattr(self.derivation, name)
+        matrix = (
+            self.derivation.A[int(name[1:]) - 1]
+            if name.startswith("A")
+            else getattr(self.derivation, name)
+        )
 
         # Sums of no terms are the number 0, not an element.
         entries = np.empty(matrix.shape, dtype=object)

@@ -77,7 +77,9 @@ class MadeAt:
 
     def __str__(self) -> str:
         link = "" if self.link is None else f" at link {self.link}"
-        return f"{self.identity}{link}" if self.body is None else f"{self.identity}{link}, {self.body}"
+        return (
+            f"{self.identity}{link}" if self.body is None else f"{self.identity}{link}, {self.body}"
+        )
 
     __repr__ = value_line
 
@@ -91,8 +93,12 @@ def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:
         One text was given instead of a set of identities.
     """
     if isinstance(mistakes, str):
-        raise TypeError(f"mistakes is {mistakes!r}; expected a set of identities, as in {{{mistakes!r}}}")
-    return frozenset(MadeAt(mistake) if isinstance(mistake, str) else mistake for mistake in mistakes)
+        raise TypeError(
+            f"mistakes is {mistakes!r}; expected a set of identities, as in {{{mistakes!r}}}"
+        )
+    return frozenset(
+        MadeAt(mistake) if isinstance(mistake, str) else mistake for mistake in mistakes
+    )
 
 
 def catalogue(*groups: Iterable[Mistake]) -> dict[str, Mistake]:
@@ -112,7 +118,9 @@ def catalogue(*groups: Iterable[Mistake]) -> dict[str, Mistake]:
     return found
 
 
-_POTENTIAL = "Look again at the potential energy: which way does it grow, and of which point is the height?"
+_POTENTIAL = (
+    "Look again at the potential energy: which way does it grow, and of which point is the height?"
+)
 _COM_VELOCITY = "Look again at the velocity of the centre of mass: differentiate its position."
 _ANGULAR_VELOCITY = "Look again at the angular velocity: which joints turn this link?"
 _INERTIA = "Look again at the inertia: of which body, about which point, and about which axes?"
@@ -124,12 +132,18 @@ _MASSES = "Look again at the masses: which body moves with which joint?"
 
 def _energy(hint: str, **sentences: str) -> list[Mistake]:
     """Return mistakes in an energy with one hint, each an identity with its sentence."""
-    return [Mistake(identity, Subject.ENERGY, sentence, hint) for identity, sentence in sentences.items()]
+    return [
+        Mistake(identity, Subject.ENERGY, sentence, hint)
+        for identity, sentence in sentences.items()
+    ]
 
 
 def _equation(hint: str, **sentences: str) -> list[Mistake]:
     """Return mistakes in the equations of motion with one hint, each an identity with its sentence."""
-    return [Mistake(identity, Subject.EQUATION, sentence, hint) for identity, sentence in sentences.items()]
+    return [
+        Mistake(identity, Subject.EQUATION, sentence, hint)
+        for identity, sentence in sentences.items()
+    ]
 
 
 MISTAKES: Mapping[str, Mistake] = catalogue(
@@ -242,19 +256,31 @@ STEP_FACTORS = {
 ROTOR_MISTAKES = frozenset(("rotor_forgotten", "rotor_gear", "rotor_without_gear"))
 """Mistakes in the kinetic energy of the rotors."""
 
-LINK_MISTAKES = frozenset(MISTAKES) - {*VELOCITY_FACTORS, *STEP_FACTORS, *ROTOR_MISTAKES, "potential_gradient_sign"}
+LINK_MISTAKES = frozenset(MISTAKES) - {
+    *VELOCITY_FACTORS,
+    *STEP_FACTORS,
+    *ROTOR_MISTAKES,
+    "potential_gradient_sign",
+}
 """Mistakes that change a link's own energies."""
 
 
-def has(mistakes: Collection[MadeAt], identity: str, i: int | None = None, body: str | None = None) -> bool:
+def has(
+    mistakes: Collection[MadeAt], identity: str, i: int | None = None, body: str | None = None
+) -> bool:
     """Return whether a mistake is made at every link, at link i (counted from 0), or at its body of this name."""
     if MadeAt(identity) in mistakes:
         return True
-    return i is not None and (MadeAt(identity, i + 1) in mistakes or MadeAt(identity, i + 1, body) in mistakes)
+    return i is not None and (
+        MadeAt(identity, i + 1) in mistakes or MadeAt(identity, i + 1, body) in mistakes
+    )
 
 
 def check_mistake(
-    made: object, n: int, known: Mapping[str, Mistake] = MISTAKES, bodies: Sequence[Sequence[str]] = ()
+    made: object,
+    n: int,
+    known: Mapping[str, Mistake] = MISTAKES,
+    bodies: Sequence[Sequence[str]] = (),
 ) -> None:
     """Check that a mistake is in a catalogue and is made at a link and body of an arm of n joints.
 
@@ -289,4 +315,6 @@ def check_mistake(
     if made.identity not in LINK_MISTAKES or made.body not in names:
         where = "" if made.link is None else f" of link {made.link}"
         expected = ", ".join(filter(None, names)) or "none"
-        raise ValueError(f"mistake {made.identity!r}: no body {made.body!r}{where}; expected {expected}")
+        raise ValueError(
+            f"mistake {made.identity!r}: no body {made.body!r}{where}; expected {expected}"
+        )

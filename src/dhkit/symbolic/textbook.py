@@ -22,7 +22,15 @@ from dhkit.symbolic.exact.compact import parallel_runs
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactBody, ExactRow, exact_arm, point_inertia
 from dhkit.symbolic.exact.naming import Symbols
 from dhkit.symbolic.exact.transforms import identity
-from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt, check_mistake, has, made_at
+from dhkit.symbolic.mistakes import (
+    LINK_MISTAKES,
+    STEP_FACTORS,
+    VELOCITY_FACTORS,
+    MadeAt,
+    check_mistake,
+    has,
+    made_at,
+)
 from dhkit.symbolic.ring import Element, Elements, Monomial, translated
 from dhkit.symbolic.ring.elements import PolynomialRing
 
@@ -217,7 +225,9 @@ def velocity_torques(
 
 @takes_robot
 def derive(
-    description: Description, mistakes: Iterable[MadeAt | str] = frozenset(), symbols: Symbols = "file"
+    description: Description,
+    mistakes: Iterable[MadeAt | str] = frozenset(),
+    symbols: Symbols = "file",
 ) -> TextbookDerivation:
     """Derive an arm's equations of motion as a textbook does.
 
@@ -260,7 +270,9 @@ def derive(
     for i, place in enumerate(_places(arm)):
         motions = []
         for body in arm.bodies[i]:
-            made_here = frozenset(mistake for mistake in LINK_MISTAKES if has(made, mistake, i, body.name))
+            made_here = frozenset(
+                mistake for mistake in LINK_MISTAKES if has(made, mistake, i, body.name)
+            )
             motions.append(_motion(arm, i, body, made_here))
         links.append(LinkMotion(place.R, place.origin, tuple(motions)))
     return TextbookDerivation(arm, tuple(links), made)
@@ -311,7 +323,14 @@ def _places(arm: ExactArm) -> tuple[_Place, ...]:
         # The link from its joint on, turned by the joint's own angle alone.
         R_zero = _with_joints_at_zero(R_before, _joints_before(arm, i))
         origin_alone = p_before + R_zero @ p_own if arm.is_standard else p
-        place = _Place(R=R, origin=p, before=p_before, axis=axis, R_alone=R_zero @ R_own, origin_alone=origin_alone)
+        place = _Place(
+            R=R,
+            origin=p,
+            before=p_before,
+            axis=axis,
+            R_alone=R_zero @ R_own,
+            origin_alone=origin_alone,
+        )
         places.append(place)
     return tuple(places)
 
@@ -356,7 +375,9 @@ class _MovingBody:
         velocity = self.velocity()
         omega = self._unturned_omega() if self.has("omega_unturned") else self.omega(axes)
         K = self.kinetic(velocity, omega)
-        return BodyMotion(self.body, self.place("velocity_relative_angle"), velocity, omega, K, self.potential())
+        return BodyMotion(
+            self.body, self.place("velocity_relative_angle"), velocity, omega, K, self.potential()
+        )
 
     @property
     def mass(self) -> Element:
@@ -398,7 +419,9 @@ class _MovingBody:
 
     def velocity(self) -> Elements:
         """Return the derivative of the position, m/s, in the link's axes, where it is shortest."""
-        place = self.joint if self.has("velocity_at_joint") else self.place("velocity_relative_angle")
+        place = (
+            self.joint if self.has("velocity_at_joint") else self.place("velocity_relative_angle")
+        )
         place_rate = np.array([x.by_time() for x in place], dtype=object)
         return self.at.R.T @ place_rate  # type: ignore[no-any-return]
 
@@ -455,7 +478,9 @@ class _MovingBody:
             # v = v_joint + omega x r, so v^2 = v_joint^2 + 2 v_joint.(omega x r) + (omega x r)^2: one term is left out.
             v_joint = self.at.R.T @ np.array([x.by_time() for x in self.joint], dtype=object)
             omega_r = velocity - v_joint
-            square = square - (2 * (v_joint @ omega_r) if self.has("velocity_cross_term") else omega_r @ omega_r)
+            square = square - (
+                2 * (v_joint @ omega_r) if self.has("velocity_cross_term") else omega_r @ omega_r
+            )
 
         translation = self.mass * square
         if self.has("translation_half_forgotten"):

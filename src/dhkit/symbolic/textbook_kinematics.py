@@ -23,11 +23,16 @@ from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_m
 from dhkit.symbolic.ring import Direction, Elements, RingError
 from dhkit.symbolic.ring.reading import difference_of_angles
 
-ROW = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
-_ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."
+ROW = (
+    "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
+)
+_ZERO_POSE = (
+    "Look again at where each joint's angle is zero: draw the arm with all joint values zero."
+)
 ORDER = "Look again at the order of rotations and translations inside A_i."
 _ENDS = (
-    "Look again at the product of the transforms: where does it begin, where does it end, and which way does it run?"
+    "Look again at the product of the transforms: "
+    "where does it begin, where does it end, and which way does it run?"
 )
 COLUMNS = "Look again at the Jacobian's columns: the joint's axis, and the lever from the joint to the tool."
 _AXES = "Look again at which axes and which point the Jacobian is for."
@@ -150,7 +155,9 @@ class TextbookKinematics:
     @cached_property
     def frames(self) -> tuple[Elements, ...]:
         """Frames 0 ... n in the world, each of shape (4, 4), m."""
-        order = range(self.arm.n - 1, -1, -1) if self._has("product_reversed") else range(self.arm.n)
+        order = (
+            range(self.arm.n - 1, -1, -1) if self._has("product_reversed") else range(self.arm.n)
+        )
         frames = [self.base]
         for i in order:
             frames.append(_product(frames[-1], self.A[i], self._has("translations_unrotated", i)))
@@ -329,7 +336,9 @@ class TextbookKinematics:
 
 
 def derive_kinematics(
-    description: Description, mistakes: Iterable[MadeAt | str] = frozenset(), symbols: Symbols = "file"
+    description: Description,
+    mistakes: Iterable[MadeAt | str] = frozenset(),
+    symbols: Symbols = "file",
 ) -> TextbookKinematics:
     """Derive an arm's link transforms, the pose of its tool and its Jacobian as a textbook does.
 
@@ -377,7 +386,10 @@ def with_massless_links(description: Description) -> Description:
     if all(joint.bodies for joint in description.joints):
         return description
     massless = Body(ZERO)
-    joints = tuple(joint if joint.bodies else replace(joint, bodies=(massless,)) for joint in description.joints)
+    joints = tuple(
+        joint if joint.bodies else replace(joint, bodies=(massless,))
+        for joint in description.joints
+    )
     return replace(description, joints=joints)
 
 
@@ -421,7 +433,9 @@ def _placement(arm: ExactArm, placement: Placement) -> Elements:
     ring = arm.ring
     naming = Naming(arm.description, arm.symbols)
     roll, pitch, yaw = (ring.direction(angle) for angle in _known_angles(arm, placement))
-    T: Elements = rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
+    T: Elements = (
+        rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
+    )
     T[:3, 3] = [ring.read(naming.known(x)) for x in placement.xyz]
     return T
 

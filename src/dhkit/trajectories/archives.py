@@ -60,8 +60,21 @@ def archive_format(suffix: str, content: bytes, most: int) -> str:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             info = archive.getinfo("format.npy")
-            return str(_npy(archive.read(info), "format")) if info.file_size <= BOUNDS.format_bytes else ""
-    except (KeyError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError, DescriptionError):
+            return (
+                str(_npy(archive.read(info), "format"))
+                if info.file_size <= BOUNDS.format_bytes
+                else ""
+            )
+    except (
+        KeyError,
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        RuntimeError,
+        OSError,
+        ValueError,
+        DescriptionError,
+    ):
         return ""
 
 
@@ -91,9 +104,19 @@ def _read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
             keys = (*keys, *(key for key in kind.optional if key in members))
             size = sum(members[key].file_size for key in keys)
             if size > kind.most:
-                raise DescriptionError(f"unpacks to {size / 1e6:.0f} MB; expected at most {kind.most / 1e6:g} MB")
+                raise DescriptionError(
+                    f"unpacks to {size / 1e6:.0f} MB; expected at most {kind.most / 1e6:g} MB"
+                )
             return {key: _npy(archive.read(members[key]), key) for key in keys}
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, MemoryError, OSError, ValueError) as error:
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        RuntimeError,
+        MemoryError,
+        OSError,
+        ValueError,
+    ) as error:
         raise DescriptionError(f"damaged, or no .npz file: {_line(error)}") from None
 
 
@@ -110,7 +133,9 @@ def _npy(data: bytes, key: str) -> Any:
         expected = "text" if wanted == "U" else "float64"
         raise DescriptionError(f"{key}: found type {dtype}; expected {expected}")
     rest = data[file.tell() :]
-    if int(np.prod(shape, dtype=object)) * dtype.itemsize != len(rest) or (wanted == "U" and shape != ()):
+    if int(np.prod(shape, dtype=object)) * dtype.itemsize != len(rest) or (
+        wanted == "U" and shape != ()
+    ):
         raise DescriptionError(f"{key}: {len(rest)} bytes for shape {shape}; the file is damaged")
     if wanted == "U":
         return str(np.frombuffer(rest, dtype)[0]) if dtype.itemsize else ""
@@ -126,7 +151,9 @@ def _read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
     for key, value in found.items():
         if isinstance(value, str) != (key in TEXTS):
             expected = "text" if key in TEXTS else "numbers"
-            raise DescriptionError(f"{key}: found {'text' if key not in TEXTS else 'numbers'}; expected {expected}")
+            raise DescriptionError(
+                f"{key}: found {'text' if key not in TEXTS else 'numbers'}; expected {expected}"
+            )
     return found
 
 
@@ -134,7 +161,9 @@ def _require_keys(found: Mapping[str, Any], kind: FileKind) -> None:
     missing = [key for key in (*TEXTS, *kind.arrays) if key not in found]
     if missing:
         names = " ".join(", ".join(sorted(found)).split())[:80] or "nothing"
-        raise DescriptionError(f"no {missing[0]} in it: found {names}; expected a {kind.noun} that dhkit saved")
+        raise DescriptionError(
+            f"no {missing[0]} in it: found {names}; expected a {kind.noun} that dhkit saved"
+        )
 
 
 def _line(error: Exception) -> str:

@@ -92,7 +92,9 @@ def circle(
     ValueError, PlanningError
         As for :func:`straight_line`.
     """
-    return _along(description, tool_circle(T0, centre, axis, angle, turning), q0, duration, limits, torques)
+    return _along(
+        description, tool_circle(T0, centre, axis, angle, turning), q0, duration, limits, torques
+    )
 
 
 def _along(

@@ -79,8 +79,13 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
     if suffix in ARCHIVES:
         if rate is not None:
             raise ValueError(f"rate is {rate!r}: {suffix} holds no samples; expected no rate")
-        arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients} | _load_numbers(trajectory)
-        write_atomically(path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays)))
+        arrays = {
+            "breaks": trajectory.breaks,
+            "coefficients": trajectory.coefficients,
+        } | _load_numbers(trajectory)
+        write_atomically(
+            path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays))
+        )
         return path
 
     comments: list[str] = []
@@ -222,7 +227,9 @@ def read_samples(
     suffix, content = TRAJECTORY.read(path, _SAMPLES)
     names = check_columns(description, columns, MATRICES if suffix == ".mat" else ())
     if names and suffix not in (".csv", ".mat"):
-        raise ValueError(f"columns is given; expected none for {suffix}, whose joint_names say which joint is which")
+        raise ValueError(
+            f"columns is given; expected none for {suffix}, whose joint_names say which joint is which"
+        )
     try:
         samples = _samples(suffix, content, description, names)
         if degrees:
@@ -368,10 +375,14 @@ def _yaml(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> st
     nanoseconds = [nanoseconds[k] for k in kept]
     t = np.minimum(np.array(nanoseconds) / _NANOSECONDS, trajectory.duration)
     names = tuple(joint.name for joint in trajectory.description.joints)
-    return trajectory_text(names, nanoseconds, trajectory.q(t), trajectory.qd(t), trajectory.qdd(t), comments)
+    return trajectory_text(
+        names, nanoseconds, trajectory.q(t), trajectory.qd(t), trajectory.qdd(t), comments
+    )
 
 
-def _samples(suffix: str, content: bytes, description: Description, columns: Mapping[str, str]) -> _FileSamples:
+def _samples(
+    suffix: str, content: bytes, description: Description, columns: Mapping[str, str]
+) -> _FileSamples:
     """Return the samples of a file of another program; a table that dhkit wrote must be of this robot."""
     if suffix == ".mat":
         table = matlab_table(description, content, TRAJECTORY.most, columns)
@@ -379,10 +390,16 @@ def _samples(suffix: str, content: bytes, description: Description, columns: Map
     text = decoded(content)
     if text.startswith(f"# {TRAJECTORY.title}"):
         TRAJECTORY.robot_of_table(text, description)
-    return _table_samples(text, description, columns) if suffix == ".csv" else _message_samples(text, description)
+    return (
+        _table_samples(text, description, columns)
+        if suffix == ".csv"
+        else _message_samples(text, description)
+    )
 
 
-def _table_samples(text: str, description: Description, columns: Mapping[str, str] | None = None) -> _FileSamples:
+def _table_samples(
+    text: str, description: Description, columns: Mapping[str, str] | None = None
+) -> _FileSamples:
     """Return the samples of a table, with the payload and friction of its comments."""
     times, arrays = select_columns(description, read_table(text), columns)
     return _FileSamples(times, arrays, _load(_commented(text)))
@@ -397,7 +414,9 @@ def _message_samples(text: str, description: Description) -> _FileSamples:
     points = message.get("points")
     own = [joint.name for joint in description.joints]
     if not isinstance(names, list) or not isinstance(points, list) or not points:
-        raise DescriptionError("no joint_names and points in it; expected a trajectory_msgs/JointTrajectory")
+        raise DescriptionError(
+            "no joint_names and points in it; expected a trajectory_msgs/JointTrajectory"
+        )
     if not all(isinstance(name, str) for name in names) or sorted(names) != sorted(own):
         raise DescriptionError(
             f"joint_names: found {', '.join(map(str, names))[:120]}; expected {', '.join(own)}, in any order"
@@ -410,13 +429,17 @@ def _message_samples(text: str, description: Description) -> _FileSamples:
         if not isinstance(point, dict):
             raise DescriptionError(f"points[{k}]: expected positions and time_from_start")
         if unknown := next((key for key in point if key not in POINT), None):
-            raise DescriptionError(f"points[{k}]: unknown key {unknown[:40]!r}; expected {', '.join(POINT)}")
+            raise DescriptionError(
+                f"points[{k}]: unknown key {unknown[:40]!r}; expected {', '.join(POINT)}"
+            )
         times.append(_seconds(point.get("time_from_start"), k))
         q, qd, qdd = (_row(point.get(key), key, k, len(own)) for key in ROWS)
         columns.append([row for row in (q, qd, qdd) if row is not None])
         is_complete = q is not None and (qd is not None or qdd is None)
         if not is_complete or len(columns[-1]) != len(columns[0]):
-            raise DescriptionError(f"points[{k}]: expected positions, and velocities and accelerations as in points[0]")
+            raise DescriptionError(
+                f"points[{k}]: expected positions, and velocities and accelerations as in points[0]"
+            )
     arrays = np.array(columns)[:, :, order]
     listed = [arrays[:, i] for i in range(arrays.shape[1])]
     return _FileSamples(np.array(times), listed, _load(_commented(text)))
@@ -428,14 +451,23 @@ def _seconds(value: Any, k: int) -> float:
         for whole, part in TIMES:
             if whole in value and part in value:
                 # Added as integers and rounded once, so that whole nanoseconds come back unchanged.
-                return (_whole(value[whole], k) * _NANOSECONDS + _whole(value[part], k)) / _NANOSECONDS
+                return (
+                    _whole(value[whole], k) * _NANOSECONDS + _whole(value[part], k)
+                ) / _NANOSECONDS
     raise DescriptionError(f"points[{k}].time_from_start: expected sec and nanosec")
 
 
 def _whole(text: Any, k: int) -> int:
     """Return a whole number of point k from its text."""
-    if not isinstance(text, str) or len(text) > BOUNDS.digits or not text.isascii() or not text.isdigit():
-        raise DescriptionError(f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number")
+    if (
+        not isinstance(text, str)
+        or len(text) > BOUNDS.digits
+        or not text.isascii()
+        or not text.isdigit()
+    ):
+        raise DescriptionError(
+            f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number"
+        )
     return int(text)
 
 
@@ -449,7 +481,9 @@ def _row(value: Any, key: str, k: int, n: int) -> list[float] | None:
     try:
         row = [float(entry) for entry in value]
     except (TypeError, ValueError):
-        raise DescriptionError(f"points[{k}].{key}: found {value!r:.60}; expected numbers") from None
+        raise DescriptionError(
+            f"points[{k}].{key}: found {value!r:.60}; expected numbers"
+        ) from None
     if not np.isfinite(row).all():
         raise DescriptionError(f"points[{k}].{key}: found {value!r:.60}; expected finite numbers")
     return row

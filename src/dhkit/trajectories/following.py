@@ -10,8 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, takes_robot
 from dhkit.description.joint_text import degrees_hint, joint_text
+from dhkit.display import listed
 from dhkit.errors import PlanningError
-from dhkit.kinematics import classify, freedoms, inverse_kinematics, jacobian, jacobian_dot, solve_numerically
+from dhkit.kinematics import (
+    classify,
+    freedoms,
+    inverse_kinematics,
+    jacobian,
+    jacobian_dot,
+    solve_numerically,
+)
 from dhkit.kinematics.newton import Newton
 from dhkit.trajectories.interpolation import quintic_hermite
 from dhkit.trajectories.limits import Limits, farthest_outside
@@ -56,7 +64,10 @@ _LIMIT_SLACK = 1e-9
 
 @takes_robot
 def joint_path(
-    description: Description, tool: ToolPath, q0: ArrayLike | None = None, limits: Limits | None = None
+    description: Description,
+    tool: ToolPath,
+    q0: ArrayLike | None = None,
+    limits: Limits | None = None,
 ) -> JointPath:
     """Return the joint path along which the tool follows a path, everywhere within 1e-7 m and 1e-7 rad.
 
@@ -96,7 +107,9 @@ def joint_path(
             problem = problem or error
         else:
             return path
-    raise problem or PlanningError(f"{description.name} does not reach the path's first pose, {_place(tool, 0.0)}")
+    raise problem or PlanningError(
+        f"{description.name} does not reach the path's first pose, {_place(tool, 0.0)}"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +185,10 @@ class _Follower:
         redundant = np.einsum("kji,kj->ki", J_rate, w)
         redundant -= np.einsum("kji,kjl,kl->ki", Vt, Vt, redundant)
 
-        second = np.einsum("kij,kj->ki", J_plus, v_rate - np.einsum("kij,kj->ki", J_rate, first)) + redundant
+        second = (
+            np.einsum("kij,kj->ki", J_plus, v_rate - np.einsum("kij,kj->ki", J_rate, first))
+            + redundant
+        )
         return units * first, units * second
 
     @property
@@ -182,7 +198,11 @@ class _Follower:
 
     def _jacobian(self, q: Array) -> Array:
         """Return Jacobians, shape (N, size, n), lengths over the reach."""
-        return self._rows * jacobian(self.newton.description, q)[:, : self.newton.size] * self.newton.units
+        return (
+            self._rows
+            * jacobian(self.newton.description, q)[:, : self.newton.size]
+            * self.newton.units
+        )
 
     def closed(self, s: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return joint values on the path, (N, n), from nearby ones q, and whether each was reached without a jump."""
@@ -244,17 +264,26 @@ class _Follower:
         error = self.newton.error(q, self.tool.poses(s.ravel()).reshape(-1, 16))
         # Newton's errors have positions over the reach: back to m.
         error[:, :3] *= self.newton.length
-        norms = np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
+        norms = np.maximum(
+            np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
+        )
         return np.asarray(norms.reshape(s.shape).max(axis=1))
 
     def _lost(self, s: float, q: Array) -> PlanningError:
         """Return the error that explains why the path ends at joint values near s."""
         position_only = self.newton.size == 3
         if self._reached(s, q, position_only=position_only):
-            near = np.linalg.svd(self._jacobian(q[None]), compute_uv=False)[0, self.rank - 1] < _NEAR_SINGULAR
+            near = (
+                np.linalg.svd(self._jacobian(q[None]), compute_uv=False)[0, self.rank - 1]
+                < _NEAR_SINGULAR
+            )
             met = "the path meets a singularity" if near else "the branch of joint values ends"
             why = f"{met}, and only a jump leads on,"
-        elif not position_only and self.rank < _POSE_COORDINATES and self._reached(s, q, position_only=True):
+        elif (
+            not position_only
+            and self.rank < _POSE_COORDINATES
+            and self._reached(s, q, position_only=True)
+        ):
             why = "the arm cannot turn its tool as the path asks"
         else:
             why = "the path leaves the workspace"
@@ -263,12 +292,14 @@ class _Follower:
     def _reached(self, s: float, q: Array, *, position_only: bool) -> bool:
         """Return whether a few poses ahead of s are within reach."""
         T = self.tool.poses(np.minimum(s + _LOOK_AHEAD, 1.0))
-        found = solve_numerically(self.newton.description, T, q, position_only=position_only, limits=False)
+        found = solve_numerically(
+            self.newton.description, T, q, position_only=position_only, limits=False
+        )
         return bool(found.valid.all())
 
     def _where(self, s: float, q: Array) -> str:
         """Return the place on the path and the joint values in words."""
-        return f"at s = {s:.4g}, {_place(self.tool, s)}; q is {np.array2string(q, precision=4)}"
+        return f"at s = {s:.4g}, {_place(self.tool, s)}; q is {listed(np.round(q, 12))}"
 
 
 def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> Iterator[Array]:
@@ -277,7 +308,9 @@ def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> I
     position_only = _aims_position(description)
     if q0 is not None:
         near = configuration(description, q0, "q0")
-        found = solve_numerically(description, T, near, position_only=position_only, restarts=0, limits=False)
+        found = solve_numerically(
+            description, T, near, position_only=position_only, restarts=0, limits=False
+        )
         yield from _wind_near(found.q[found.valid], near, description)
         if found.valid.any():
             return
@@ -287,7 +320,9 @@ def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> I
         middle = Newton.of(description, position_only=True, limits=True).middle
         near = middle if q0 is None else configuration(description, q0, "q0")
         usable = solutions.q[solutions.allowed if q0 is None else solutions.valid]
-        yield from sorted(_wind_near(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2)))
+        yield from sorted(
+            _wind_near(usable, near, description), key=lambda q: float(np.sum((q - near) ** 2))
+        )
         return
     found = solve_numerically(description, T, q0, position_only=position_only)
     yield from found.q[found.valid]

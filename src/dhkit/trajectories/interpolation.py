@@ -26,12 +26,18 @@ def check_times(times: ArrayLike) -> Array:
         raise ValueError(f"times[{int(np.flatnonzero(~np.isfinite(t))[0])}] is not finite")
     if (np.diff(t) <= 0).any():
         k = int(np.flatnonzero(np.diff(t) <= 0)[0])
-        raise ValueError(f"times do not increase: times[{k}] is {t[k]:g} s, times[{k + 1}] is {t[k + 1]:g} s")
+        raise ValueError(
+            f"times do not increase: times[{k}] is {t[k]:g} s, times[{k + 1}] is {t[k + 1]:g} s"
+        )
     return t
 
 
 def interpolated(
-    description: Description, times: ArrayLike, q: ArrayLike, qd: ArrayLike | None, qdd: ArrayLike | None
+    description: Description,
+    times: ArrayLike,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    qdd: ArrayLike | None,
 ) -> tuple[Array, Array]:
     """Return breaks and coefficients; see :meth:`dhkit.trajectories.Trajectory.from_samples`."""
     from scipy.interpolate import CubicSpline

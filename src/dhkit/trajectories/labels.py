@@ -83,7 +83,9 @@ class FileKind:
             Their digest differs from the one in the archive.
         """
         if values["content"] != self._digest_of_arrays(values):
-            raise DescriptionError("its numbers differ from those that were written; the file is damaged")
+            raise DescriptionError(
+                "its numbers differ from those that were written; the file is damaged"
+            )
 
     def _digest_of_arrays(self, arrays: Mapping[str, Any]) -> str:
         # Shapes are left out: MATLAB adds and drops axes of length 1.
@@ -94,7 +96,9 @@ class FileKind:
                 found.update(f"{name} {numbers.size}\n".encode() + numbers.tobytes())
         return found.hexdigest()[:_DIGEST_DIGITS]
 
-    def robot_of_archive(self, values: Mapping[str, Any], description: Description | None) -> Description:
+    def robot_of_archive(
+        self, values: Mapping[str, Any], description: Description | None
+    ) -> Description:
         """Return the robot of an archive: the one given, the library's if it is equal, or the archive's own.
 
         Raises
@@ -103,10 +107,14 @@ class FileKind:
             Another kind or version of file, a robot that does not fit its name and digest, or another than the given.
         """
         if values["format"] != self.version:
-            raise DescriptionError(f"format is {values['format'][:40]!r}; expected {self.version!r}")
+            raise DescriptionError(
+                f"format is {values['format'][:40]!r}; expected {self.version!r}"
+            )
         own = from_toml(values["toml"], file="its robot")
         if own.digest != values["digest"] or own.name != values["robot"]:
-            raise DescriptionError(f"its robot is not the {values['robot'][:40]!r} that it names; the file is damaged")
+            raise DescriptionError(
+                f"its robot is not the {values['robot'][:40]!r} that it names; the file is damaged"
+            )
         if description is not None:
             return self._same_robot(own.name, own.digest, description)
         # The library's robot has the folder of its meshes.
@@ -127,9 +135,13 @@ class FileKind:
         """
         lines = text.splitlines()
         if len(lines) < 3 or not lines[2].startswith(_CONTENT):
-            raise DescriptionError(f"no comment '{_CONTENT}DIGEST' in its third line{self.otherwise}")
+            raise DescriptionError(
+                f"no comment '{_CONTENT}DIGEST' in its third line{self.otherwise}"
+            )
         if lines[2].removeprefix(_CONTENT).strip() != _digest_of_lines([lines[1], *lines[3:]]):
-            raise DescriptionError(f"changed since dhkit wrote it: its digest differs{self.otherwise}")
+            raise DescriptionError(
+                f"changed since dhkit wrote it: its digest differs{self.otherwise}"
+            )
 
     def robot_of_table(self, text: str, description: Description | None) -> Description:
         """Return the robot that a table's first two comments name: the one given, or the library's.
@@ -141,8 +153,15 @@ class FileKind:
         """
         lines = text[:_LABEL_LENGTH].splitlines()[:2]
         words = lines[1].removeprefix("# robot: ").split() if len(lines) == 2 else []
-        if not lines or lines[0] != f"# {self.title}" or len(words) != 2 or not lines[1].startswith("# robot: "):
-            raise DescriptionError(f"does not begin with '# {self.title}' and '# robot: NAME DIGEST'{self.otherwise}")
+        if (
+            not lines
+            or lines[0] != f"# {self.title}"
+            or len(words) != 2
+            or not lines[1].startswith("# robot: ")
+        ):
+            raise DescriptionError(
+                f"does not begin with '# {self.title}' and '# robot: NAME DIGEST'{self.otherwise}"
+            )
         name, digest = words
         if description is not None:
             return self._same_robot(name, digest, description)
@@ -172,7 +191,9 @@ def checked_suffix(path: Path, known: tuple[str, ...]) -> str:
     """
     suffix = path.suffix.lower()
     if suffix not in known:
-        raise ValueError(f"{path}: found suffix {path.suffix!r}; expected one of {', '.join(known)}")
+        raise ValueError(
+            f"{path}: found suffix {path.suffix!r}; expected one of {', '.join(known)}"
+        )
     return suffix
 
 

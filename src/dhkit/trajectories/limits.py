@@ -48,18 +48,26 @@ class Limits:
             if array.shape != (n,):
                 raise ValueError(f"{item.name} has shape {array.shape}; expected ({n},)")
             bounds = item.name in ("lower", "upper")
-            nowhere = {"lower": np.inf, "upper": -np.inf}.get(item.name)  # no joint value is allowed
+            nowhere = {"lower": np.inf, "upper": -np.inf}.get(
+                item.name
+            )  # no joint value is allowed
             wrong = np.isnan(array) | (array == nowhere) if bounds else ~(array > 0)
             if wrong.any():
                 i = int(np.flatnonzero(wrong)[0])
                 free = "-inf" if item.name == "lower" else "inf"
-                expected = f"a number, or {free} for none" if bounds else "a positive number, or inf"
-                raise ValueError(f"{item.name} of joint {i + 1} is {array[i]:g}; expected {expected}")
+                expected = (
+                    f"a number, or {free} for none" if bounds else "a positive number, or inf"
+                )
+                raise ValueError(
+                    f"{item.name} of joint {i + 1} is {array[i]:g}; expected {expected}"
+                )
             array.flags.writeable = False
             object.__setattr__(self, item.name, array)
         if (self.lower > self.upper).any():
             i = int(np.flatnonzero(self.lower > self.upper)[0])
-            raise ValueError(f"lower of joint {i + 1} is {self.lower[i]:g}, above upper, {self.upper[i]:g}")
+            raise ValueError(
+                f"lower of joint {i + 1} is {self.lower[i]:g}, above upper, {self.upper[i]:g}"
+            )
 
     @property
     def unlimited(self) -> tuple[str, ...]:
@@ -70,7 +78,9 @@ class Limits:
             joints = ", ".join(str(i + 1) for i in free)
             if len(free):
                 all_free = len(free) == len(self.velocity)
-                found.append(name if all_free else f"{name} of joint{'s' * (len(free) > 1)} {joints}")
+                found.append(
+                    name if all_free else f"{name} of joint{'s' * (len(free) > 1)} {joints}"
+                )
         return tuple(found)
 
     @classmethod
@@ -127,7 +137,11 @@ class Limits:
         return cls(**values)
 
     def scaled(
-        self, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0
+        self,
+        velocity: float = 1.0,
+        acceleration: float = 1.0,
+        jerk: float = 1.0,
+        torque: float = 1.0,
     ) -> Limits:
         """Return the limits times factors; those of position stay.
 
@@ -151,12 +165,17 @@ class Limits:
         position = {"position": np.append(self.lower, self.upper)}
         given = position | {item.name: getattr(self, item.name) for item in fields(self)[2:]}
         limited = [name for name, limit in given.items() if np.isfinite(limit).any()]
-        return repr_line("Limits", counted(len(self.lower), "joint"), ", ".join(limited) or "unlimited")
+        return repr_line(
+            "Limits", counted(len(self.lower), "joint"), ", ".join(limited) or "unlimited"
+        )
 
     def _repr_html_(self) -> str:
         names = [item.name for item in fields(self)]
         columns = [getattr(self, name) for name in names]
-        rows = [(str(i), *map(_limit_text, row)) for i, row in enumerate(zip(*columns, strict=True), start=1)]
+        rows = [
+            (str(i), *map(_limit_text, row))
+            for i, row in enumerate(zip(*columns, strict=True), start=1)
+        ]
         caption = "Limits: rad or m, over s, s² and s³; torques N m or N"
         return html_table(("joint", *names), rows, caption, align="r")
 

@@ -19,7 +19,9 @@ from dhkit.description.mat_files import MatVariable, read_mat
 from dhkit.errors import DescriptionError
 from dhkit.trajectories.tables import PREFIXES, TIMES, Table, joint_columns, place_of_name
 
-_ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
+_ARRAY_EXPORT = (
+    "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
+)
 """Advice for variables that are not read."""
 _OUTPUTS = ("yout", "simout")
 """Simulink's names of outputs; they are joint values where nothing else is."""
@@ -89,7 +91,9 @@ def matlab_choices(description: Description, content: bytes, most: int) -> dict[
     return {"t": list(dict.fromkeys(times)), "q": values}
 
 
-def matlab_table(description: Description, content: bytes, most: int, columns: Mapping[str, str]) -> Table:
+def matlab_table(
+    description: Description, content: bytes, most: int, columns: Mapping[str, str]
+) -> Table:
     """Return the samples of a .mat file as a table whose columns have our names.
 
     Parameters
@@ -132,13 +136,19 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
             _add_times(found, variable.name, array[:, 0])
         found |= {f"{ours}{i + 1}": column for i, column in enumerate(array[:, -n:].T)}
     if "t" not in found:
-        raise DescriptionError(f"no times: found {_listed(variables)}; expected a vector t or time; {_ARRAY_EXPORT}")
+        raise DescriptionError(
+            f"no times: found {_listed(variables)}; expected a vector t or time; {_ARRAY_EXPORT}"
+        )
     if len(found) == 1:
         expected = "expected q or q1 ..., or columns={'q': ...} that says which they are"
-        raise DescriptionError(f"no joint values: found {_listed(variables)}; {expected}; {_ARRAY_EXPORT}")
+        raise DescriptionError(
+            f"no joint values: found {_listed(variables)}; {expected}; {_ARRAY_EXPORT}"
+        )
     for ours, column in found.items():
         if len(column) != len(found["t"]):
-            raise DescriptionError(f"{ours} has {len(column)} values; expected {len(found['t'])}, one for each time")
+            raise DescriptionError(
+                f"{ours} has {len(column)} values; expected {len(found['t'])}, one for each time"
+            )
     return tuple(found), np.stack(list(found.values()), axis=1)
 
 
@@ -158,7 +168,9 @@ def _chosen(
             candidates[f"{ours}{i}"] = names
 
     # T beside t is a pose or a sample period, and Q a weight: names of one letter have their own case.
-    spelled = {name.lower(): name for name in variables if len(name) > 1} | {name: name for name in variables}
+    spelled = {name.lower(): name for name in variables if len(name) > 1} | {
+        name: name for name in variables
+    }
     chosen: dict[str, Variable] = {}
     for ours, known in candidates.items():
         if ours in columns:
@@ -185,8 +197,12 @@ def _named(text: str, variables: Mapping[str, Variable]) -> Variable:
     last = int(match[3] or first)
     if array.ndim != 2 or not 1 <= first <= last <= array.shape[1]:
         found = f"{variable.name} has shape {array.shape}"
-        raise DescriptionError(f"{text[:40]}: {found}; expected columns from 1 to {array.shape[-1]}")
-    return Signal(text, array[:, first - 1 : last], variable.times if isinstance(variable, Signal) else None)
+        raise DescriptionError(
+            f"{text[:40]}: {found}; expected columns from 1 to {array.shape[-1]}"
+        )
+    return Signal(
+        text, array[:, first - 1 : last], variable.times if isinstance(variable, Signal) else None
+    )
 
 
 def _with_signals(variables: Mapping[str, MatVariable]) -> dict[str, Variable]:
@@ -218,7 +234,9 @@ def _signals_of(variable: MatVariable) -> list[Signal] | None:
         if values is None:
             continue
         # Simulink puts time last in values of three axes, (a, b, N).
-        rows = values if values.ndim == 2 else np.moveaxis(values, -1, 0).reshape(values.shape[-1], -1)
+        rows = (
+            values if values.ndim == 2 else np.moveaxis(values, -1, 0).reshape(values.shape[-1], -1)
+        )
         label = signal["label"].value if "label" in signal and signal["label"].readable else ""
         name = label.strip() if isinstance(label, str) else ""
         signals.append(Signal(name, rows, None if times is None else times.ravel()))

@@ -53,7 +53,11 @@ class JointPath:
         pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
         if pieces.end != 1.0:
             raise ValueError(f"breaks end with {pieces.end:g}; expected 1")
-        for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
+        for name, value in (
+            ("breaks", pieces.breaks),
+            ("coefficients", pieces.coefficients),
+            ("pieces", pieces),
+        ):
             object.__setattr__(self, name, value)
 
     @classmethod
@@ -128,7 +132,9 @@ class JointPath:
 
     def __repr__(self) -> str:
         pieces, powers = self.coefficients.shape[:2]
-        return repr_line("JointPath", self.description.name, f"{counted(pieces, 'piece')} of degree {powers - 1}")
+        return repr_line(
+            "JointPath", self.description.name, f"{counted(pieces, 'piece')} of degree {powers - 1}"
+        )
 
     def _merged_breaks(self, law: Pieces) -> Array:
         """Return the law's breaks together with the times at which s passes breaks of the path."""
@@ -172,7 +178,9 @@ def _check_law(law: Pieces) -> None:
         raise ValueError(f"s jumps by {jump:.3g} at a break; expected a continuous s(t)")
     rate = law.derivative.bounds(_LAW_SLACK / law.end / 2)
     if rate.lowest[0] * law.end < -_LAW_SLACK:
-        raise ValueError(f"s goes back at {rate.at_lowest[0]:.4g} s; expected an s(t) that never does")
+        raise ValueError(
+            f"s goes back at {rate.at_lowest[0]:.4g} s; expected an s(t) that never does"
+        )
 
 
 def _compose(outer: Array, inner: Array) -> Array:

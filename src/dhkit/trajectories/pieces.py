@@ -59,7 +59,9 @@ class Pieces:
         if b.ndim != 1 or len(b) < 2:
             raise ValueError(f"breaks has shape {b.shape}; expected (K+1,) with K >= 1")
         if c.ndim != 3 or c.shape[0] != len(b) - 1 or c.shape[1] < 1 or c.shape[2] != columns:
-            raise ValueError(f"coefficients has shape {c.shape}; expected ({len(b) - 1}, p+1, {columns})")
+            raise ValueError(
+                f"coefficients has shape {c.shape}; expected ({len(b) - 1}, p+1, {columns})"
+            )
         for name, array in (("breaks", b), ("coefficients", c)):
             if not np.isfinite(array).all():
                 place = tuple(map(int, np.argwhere(~np.isfinite(array))[0]))
@@ -68,7 +70,9 @@ class Pieces:
             raise ValueError(f"breaks begin with {b[0]:g}; expected 0")
         if (np.diff(b) <= 0).any():
             k = int(np.flatnonzero(np.diff(b) <= 0)[0])
-            raise ValueError(f"breaks do not increase: breaks[{k}] is {b[k]:g}, breaks[{k + 1}] is {b[k + 1]:g}")
+            raise ValueError(
+                f"breaks do not increase: breaks[{k}] is {b[k]:g}, breaks[{k + 1}] is {b[k + 1]:g}"
+            )
         b.flags.writeable = c.flags.writeable = False
         return cls(b, c)
 
@@ -207,7 +211,9 @@ class Pieces:
 
     def __repr__(self) -> str:
         pieces, powers, columns = self.coefficients.shape
-        return repr_line("Pieces", summary=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}")
+        return repr_line(
+            "Pieces", summary=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}"
+        )
 
 
 def _halves(b: Array) -> tuple[Array, Array]:

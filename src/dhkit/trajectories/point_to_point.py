@@ -75,7 +75,9 @@ def cubic(
     T = _unit(duration, ends)
     qd = np.stack([configuration(description, qd0, "qd0"), configuration(description, qd1, "qd1")])
     times = np.array([0.0, T])
-    return timed(Trajectory(description, times, cubic_hermite(times, q, qd)), duration, limits, torques)
+    return timed(
+        Trajectory(description, times, cubic_hermite(times, q, qd)), duration, limits, torques
+    )
 
 
 @takes_robot
@@ -108,9 +110,16 @@ def quintic(
     q = np.stack([configuration(description, q0, "q0"), configuration(description, q1, "q1")])
     T = _unit(duration, (qd0, qd1, qdd0, qdd1))
     qd = np.stack([configuration(description, qd0, "qd0"), configuration(description, qd1, "qd1")])
-    qdd = np.stack([configuration(description, qdd0, "qdd0"), configuration(description, qdd1, "qdd1")])
+    qdd = np.stack(
+        [configuration(description, qdd0, "qdd0"), configuration(description, qdd1, "qdd1")]
+    )
     times = np.array([0.0, T])
-    return timed(Trajectory(description, times, quintic_hermite(times, q, qd, qdd)), duration, limits, torques)
+    return timed(
+        Trajectory(description, times, quintic_hermite(times, q, qd, qdd)),
+        duration,
+        limits,
+        torques,
+    )
 
 
 @takes_robot
@@ -166,7 +175,9 @@ def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
     """Return the duration for which the polynomial is made first; rates and accelerations need the final one."""
     check_duration(duration)
     if duration is None and any(np.any(np.asarray(end)) for end in ends if end is not None):
-        raise ValueError("rates or accelerations at the ends are given, but no duration; expected a duration")
+        raise ValueError(
+            "rates or accelerations at the ends are given, but no duration; expected a duration"
+        )
     return 1.0 if duration is None else duration
 
 
@@ -182,7 +193,9 @@ def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Tr
     brake = np.stack([q1 - v * blend / 2, v, -v / (2 * blend)])
     if blend == 0.5:
         return Trajectory(description, np.array([0.0, 0.5, 1.0]), np.stack([speed_up, brake]))
-    return Trajectory(description, np.array([0.0, blend, 1 - blend, 1.0]), np.stack([speed_up, cruise, brake]))
+    return Trajectory(
+        description, np.array([0.0, blend, 1 - blend, 1.0]), np.stack([speed_up, cruise, brake])
+    )
 
 
 def _chosen_blend(
@@ -204,7 +217,9 @@ def _chosen_blend(
         return _USUAL_BLEND
 
 
-def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:
+def _best_blend(
+    description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None
+) -> float:
     """Return the blend, as a share of the duration, with the shortest duration that the limits allow."""
     # The duration may have several minima in the blend: a grid is searched before one is refined.
     low = _MIN_BLEND

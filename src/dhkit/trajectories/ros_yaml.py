@@ -43,7 +43,9 @@ def parse_message(text: str) -> dict[str, Any]:
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):
                 value = _value(next(events), events, 0)
-                if message is not None and value:  # ROS ends a message with ---, which begins an empty document
+                if (
+                    message is not None and value
+                ):  # ROS ends a message with ---, which begins an empty document
                     raise _UnexpectedError(event, "one message, not several")
                 message = value if message is None else message
     except _UnexpectedError as error:
@@ -77,7 +79,9 @@ def _value(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
     if isinstance(event, yaml.ScalarEvent):
         return event.value
     if isinstance(event, yaml.SequenceStartEvent):
-        entries = itertools.takewhile(lambda entry: not isinstance(entry, yaml.SequenceEndEvent), events)
+        entries = itertools.takewhile(
+            lambda entry: not isinstance(entry, yaml.SequenceEndEvent), events
+        )
         return [_value(entry, events, depth + 1) for entry in entries]
     mapping: dict[str, Any] = {}
     while not isinstance(key := next(events), yaml.MappingEndEvent):
@@ -92,11 +96,18 @@ def _value(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
 def _wrong(text: str, mark: yaml.Mark | None, expected: str) -> DescriptionError:
     lines = text.splitlines() or [""]
     number = min(0 if mark is None else mark.line, len(lines) - 1)
-    return DescriptionError(f"line {number + 1}: found {lines[number].strip()[:60]!r}; expected {expected}")
+    return DescriptionError(
+        f"line {number + 1}: found {lines[number].strip()[:60]!r}; expected {expected}"
+    )
 
 
 def trajectory_text(
-    names: tuple[str, ...], nanoseconds: list[int], q: Array, qd: Array, qdd: Array, comments: tuple[str, ...]
+    names: tuple[str, ...],
+    nanoseconds: list[int],
+    q: Array,
+    qd: Array,
+    qdd: Array,
+    comments: tuple[str, ...],
 ) -> str:
     """Return a JointTrajectory as ``ros2 topic pub`` takes it.
 
@@ -112,14 +123,26 @@ def trajectory_text(
         First lines of the file.
     """
     lines = [f"# {comment}" for comment in comments]
-    lines += ["header:", "  stamp:", "    sec: 0", "    nanosec: 0", "  frame_id: ''", "joint_names:"]
+    lines += [
+        "header:",
+        "  stamp:",
+        "    sec: 0",
+        "    nanosec: 0",
+        "  frame_id: ''",
+        "joint_names:",
+    ]
     lines += [f"- {_name(name)}" for name in names]
     lines.append("points:")
     for time, *rows in zip(nanoseconds, q.tolist(), qd.tolist(), qdd.tolist(), strict=True):
         for k, (key, row) in enumerate(zip(ROWS, rows, strict=True)):
             lines.append(f"{'  ' if k else '- '}{key}: [{', '.join(map(_number, row))}]")
         sec, nanosec = divmod(time, 1_000_000_000)
-        lines += ["  effort: []", "  time_from_start:", f"    sec: {sec}", f"    nanosec: {nanosec}"]
+        lines += [
+            "  effort: []",
+            "  time_from_start:",
+            f"    sec: {sec}",
+            f"    nanosec: {nanosec}",
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -42,7 +42,9 @@ class Samples:
         """
         from dhkit.dynamics import inverse_dynamics
 
-        loaded = self.description if self.payload is None else self.payload.carried(self.description)
+        loaded = (
+            self.description if self.payload is None else self.payload.carried(self.description)
+        )
         return inverse_dynamics(loaded, self.q, self.qd, self.qdd, friction=self.friction or False)
 
     def __repr__(self) -> str:
@@ -50,18 +52,24 @@ class Samples:
 
     def _repr_html_(self) -> str:
         headings = ["t [s]"]
-        for joint, is_prismatic in zip(self.description.joints, self.description.numbers.prismatic, strict=True):
+        for joint, is_prismatic in zip(
+            self.description.joints, self.description.numbers.prismatic, strict=True
+        ):
             headings.append(f"{joint.name} [{'m' if is_prismatic else 'rad'}]")
 
         rows = []
         for t, q in zip(self.times[:_SHOWN_TIMES], self.q[:_SHOWN_TIMES], strict=True):
             values = [f"{x:.4f}" for x in q]
             rows.append((f"{t:.4g}", *values))
-        caption = f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
+        caption = (
+            f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
+        )
         return html_table(headings, rows, caption, align="r", count=len(self.times))
 
     @property
     def _summary(self) -> str:
         if not len(self.times):
             return "0 times"
-        return f"{counted(len(self.times), 'time')} from {self.times[0]:.4g} to {self.times[-1]:.4g} s"
+        return (
+            f"{counted(len(self.times), 'time')} from {self.times[0]:.4g} to {self.times[-1]:.4g} s"
+        )

@@ -41,17 +41,26 @@ def motion_schema() -> dict[str, object]:
             "minItems": 1,
             "uniqueItems": True,
         },
-        "points": {"type": "array", "description": "Samples in order of time.", "items": _point(), "minItems": 2},
+        "points": {
+            "type": "array",
+            "description": "Samples in order of time.",
+            "items": _point(),
+            "minItems": 2,
+        },
     }
-    return titled_schema("dhkit motion file", _closed(properties, description, ["joint_names", "points"]))
+    return titled_schema(
+        "dhkit motion file", _closed(properties, description, ["joint_names", "points"])
+    )
 
 
 def _point() -> dict[str, object]:
     positions, velocities, accelerations = ROWS
     properties = {
         positions: _ROW | {"description": "Joint values, rad and m, one a joint."},
-        velocities: _ROW_OR_NONE | {"description": "Joint rates, rad/s and m/s; in all points or in none."},
-        accelerations: _ROW_OR_NONE | {"description": "Joint accelerations, rad/s^2 and m/s^2; only with velocities."},
+        velocities: _ROW_OR_NONE
+        | {"description": "Joint rates, rad/s and m/s; in all points or in none."},
+        accelerations: _ROW_OR_NONE
+        | {"description": "Joint accelerations, rad/s^2 and m/s^2; only with velocities."},
         "effort": {"description": "Joint torques, N m and N; not read."},
         "time_from_start": _duration(),
     }
@@ -73,7 +82,14 @@ def _duration() -> dict[str, object]:
     return duration | {"anyOf": [{"required": [*keys]} for keys in TIMES]}
 
 
-def _closed(properties: dict[str, object], description: str, required: list[str] | None = None) -> dict[str, object]:
+def _closed(
+    properties: dict[str, object], description: str, required: list[str] | None = None
+) -> dict[str, object]:
     """Return the schema of a mapping without other keys."""
-    known = {"type": "object", "description": description, "properties": properties, "additionalProperties": False}
+    known = {
+        "type": "object",
+        "description": description,
+        "properties": properties,
+        "additionalProperties": False,
+    }
     return known | ({"required": required} if required else {})

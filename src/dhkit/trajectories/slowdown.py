@@ -94,7 +94,9 @@ def least_slowdown(
     >>> round(least_slowdown(motion, Limits.of(arm, velocity=0.5, torque=np.inf)), 12)
     3.0
     """
-    c = float(least_slowdowns([trajectory], limits, torques, points, may_be_unlimited=may_be_unlimited)[0])
+    c = float(
+        least_slowdowns([trajectory], limits, torques, points, may_be_unlimited=may_be_unlimited)[0]
+    )
     if torques is not None or c == 0 or np.isinf(limits.torque).all():
         return c
     return _with_torques_between(trajectory, limits, c)
@@ -284,7 +286,9 @@ class _SamplePoints:
         return np.concatenate(q), np.concatenate(qd), np.concatenate(qdd)
 
 
-def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int) -> Array:
+def _by_torques(
+    trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int
+) -> Array:
     """Return the least slowdown by torques, shape (m,)."""
     description = trajectories[0].description
     samples = _SamplePoints.spread(trajectories, points)
@@ -329,7 +333,9 @@ def _tightest(owner: NDArray[np.intp], room: Array, count: int) -> NDArray[np.in
     return np.asarray(np.concatenate(rows), dtype=np.intp)
 
 
-def _refuse_holding(description: Description, i: int, needed: float, limit: float, when: float) -> None:
+def _refuse_holding(
+    description: Description, i: int, needed: float, limit: float, when: float
+) -> None:
     """Raise the error that joint i, from 0, needs more than its limit to hold the arm."""
     unit = "N" if description.numbers.prismatic[i] else "N m"
     raise PlanningError(

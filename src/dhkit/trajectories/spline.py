@@ -64,7 +64,9 @@ def spline(
         t = t - t[0]
         duration = float(t[-1])
     curve = CubicSpline(t, q, bc_type="clamped")
-    return timed(Trajectory(description, t, np.moveaxis(curve.c[::-1], 0, 1)), duration, limits, torques)
+    return timed(
+        Trajectory(description, t, np.moveaxis(curve.c[::-1], 0, 1)), duration, limits, torques
+    )
 
 
 def _spaced(q: Array, limits: Limits) -> Array:

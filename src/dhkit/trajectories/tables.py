@@ -14,7 +14,11 @@ from dhkit.trajectories.bounds import BOUNDS
 
 TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 """Names of a column of times; the last is Simulink's."""
-PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
+PREFIXES = (
+    ("q", "pos", "position"),
+    ("qd", "dq", "vel", "velocity"),
+    ("qdd", "ddq", "acc", "acceleration"),
+)
 """Prefixes of columns of values, rates and accelerations before a joint's number, or suffixes after its name."""
 
 _NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
@@ -55,22 +59,32 @@ def read_table(text: str) -> Table:
             if all(map(_is_number, cells)):
                 raise DescriptionError(_NO_HEADER)
             if len(set(cells)) < len(cells):
-                raise DescriptionError(f"line {number}: a column's name stands there twice; expected different names")
+                raise DescriptionError(
+                    f"line {number}: a column's name stands there twice; expected different names"
+                )
             names = tuple(cells)
             continue
 
         if len(cells) != len(names):
-            raise DescriptionError(f"line {number}: {len(cells)} values; expected {len(names)}, as in the header")
+            raise DescriptionError(
+                f"line {number}: {len(cells)} values; expected {len(names)}, as in the header"
+            )
         try:
             rows.append([float(cell) for cell in cells])
         except ValueError:
             k = next(k for k, cell in enumerate(cells) if not _is_number(cell))
-            raise DescriptionError(f"line {number}: {names[k]} is {cells[k][:40]!r}; expected a number") from None
+            raise DescriptionError(
+                f"line {number}: {names[k]} is {cells[k][:40]!r}; expected a number"
+            ) from None
         if not np.isfinite(rows[-1]).all():
             k = int(np.flatnonzero(~np.isfinite(rows[-1]))[0])
-            raise DescriptionError(f"line {number}: {names[k]} is {cells[k][:40]}; expected a finite number")
+            raise DescriptionError(
+                f"line {number}: {names[k]} is {cells[k][:40]}; expected a finite number"
+            )
     if names is None or not rows:
-        raise DescriptionError("no samples in it; expected a line of column names and one line a sample")
+        raise DescriptionError(
+            "no samples in it; expected a line of column names and one line a sample"
+        )
     return names, np.array(rows)
 
 
@@ -96,8 +110,12 @@ def check_columns(
         Not a mapping of texts to texts.
     """
     given: Any = {} if columns is None else columns
-    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in (*given, *given.values())):
-        raise TypeError(f"columns is {columns!r:.60}; expected a mapping of our names to those of the file")
+    if not isinstance(given, Mapping) or not all(
+        isinstance(name, str) for name in (*given, *given.values())
+    ):
+        raise TypeError(
+            f"columns is {columns!r:.60}; expected a mapping of our names to those of the file"
+        )
 
     # Our names by the names that stand for them: a joint's name for its values, unless it is one of our names.
     joints = [joint.name for joint in description.joints]
@@ -109,7 +127,9 @@ def check_columns(
     checked: dict[str, str] = {}
     for ours, theirs in given.items():
         if ours not in own or own[ours] in checked:
-            expected = ", ".join(("t", *matrices, f"q1 ... q{len(joints)}", "qd1 ...", "qdd1 ...", *joints))
+            expected = ", ".join(
+                ("t", *matrices, f"q1 ... q{len(joints)}", "qd1 ...", "qdd1 ...", *joints)
+            )
             raise ValueError(f"columns: found {ours!r}; expected each at most once of {expected}")
         checked[own[ours]] = theirs
     return checked
@@ -125,7 +145,9 @@ def place_of_name(wanted: str, names: Collection[str], what: str = "column") -> 
     """
     alike = [name for name in names if name.lower() == wanted.lower()]
     if wanted not in alike and len(alike) != 1:
-        raise DescriptionError(f"no {what} {wanted[:40]!r}: found {', '.join(names)[:80] or 'none'}")
+        raise DescriptionError(
+            f"no {what} {wanted[:40]!r}: found {', '.join(names)[:80] or 'none'}"
+        )
     return wanted if wanted in alike else alike[0]
 
 
@@ -158,7 +180,9 @@ def select_columns(
     if time is None and all(is_plain_number(name) for name in header):
         raise DescriptionError(_NO_HEADER)
     if time is None:
-        raise DescriptionError(f"no column of times: found {', '.join(header)[:80]}; expected t or time")
+        raise DescriptionError(
+            f"no column of times: found {', '.join(header)[:80]}; expected t or time"
+        )
 
     chosen: list[Array] = []
     for order, prefixes in enumerate(PREFIXES):

@@ -22,7 +22,9 @@ _DURATION_SLACK = 1e-9
 """Share by which rounding may make a duration shorter than the limits allow."""
 
 
-def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torques: Torques | None) -> Trajectory:
+def timed(
+    shape: Trajectory, duration: float | None, limits: Limits | None, torques: Torques | None
+) -> Trajectory:
     """Return a motion over another duration.
 
     Parameters
@@ -81,7 +83,9 @@ def check_duration(duration: float | None) -> None:
     if duration is None:
         return
     if not isinstance(duration, Real) or not _MIN_DURATION <= duration <= _MAX_DURATION:
-        raise ValueError(f"duration is {duration!r}; expected {_MIN_DURATION:g} to {_MAX_DURATION:g} s")
+        raise ValueError(
+            f"duration is {duration!r}; expected {_MIN_DURATION:g} to {_MAX_DURATION:g} s"
+        )
 
 
 def configuration(description: Description, value: ArrayLike | None, name: str) -> Array:

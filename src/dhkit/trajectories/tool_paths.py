@@ -92,9 +92,13 @@ class ToolCircle:
 
     def __repr__(self) -> str:
         angle = float(np.linalg.norm(self.turn))
-        radius = float(np.linalg.norm(np.cross(self.turn, self.T0[:3, 3] - self.centre))) / (angle or 1.0)
+        radius = float(np.linalg.norm(np.cross(self.turn, self.T0[:3, 3] - self.centre))) / (
+            angle or 1.0
+        )
         tool = "turning with it" if self.turning else "keeping its orientation"
-        return repr_line("ToolCircle", summary=f"{angle:.4g} rad of radius {radius:.4g} m, the tool {tool}")
+        return repr_line(
+            "ToolCircle", summary=f"{angle:.4g} rad of radius {radius:.4g} m, the tool {tool}"
+        )
 
     def _radii(self, s: Array) -> Array:
         """Return vectors from the centre to the tool, shape (N, 3), m."""
@@ -126,7 +130,11 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
 
 
 def tool_circle(
-    T0: ArrayLike, centre: ArrayLike, axis: ArrayLike, angle: float = 2 * np.pi, turning: bool = False
+    T0: ArrayLike,
+    centre: ArrayLike,
+    axis: ArrayLike,
+    angle: float = 2 * np.pi,
+    turning: bool = False,
 ) -> ToolCircle:
     """Return an arc that begins at a pose.
 

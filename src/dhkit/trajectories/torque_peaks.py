@@ -82,7 +82,9 @@ def torque_peaks(
 
     # Torques are functions of q, qd and qdd: their fourth derivatives have derivatives of q up to the sixth. That of
     # viscous friction B qd is B times the fifth derivative of q.
-    motion = np.stack([np.abs(cells.differentiated(m).bernstein).max(axis=1) for m in range(ORDER + 3)])
+    motion = np.stack(
+        [np.abs(cells.differentiated(m).bernstein).max(axis=1) for m in range(ORDER + 3)]
+    )
     fourth = torque_derivative_bounds(description, motion)
     if friction is not None:
         fourth += np.abs(numbers.viscous) * motion[ORDER + 1]
@@ -90,7 +92,9 @@ def torque_peaks(
     if friction is not None and is_smooth:
         fourth += dry_friction_bounds(numbers, friction.width, _least_speeds(cells), motion)
     fourth /= limit
-    least_dry, most_dry, is_dry_constant = _dry_friction_steps(description, cells, None if is_smooth else friction)
+    least_dry, most_dry, is_dry_constant = _dry_friction_steps(
+        description, cells, None if is_smooth else friction
+    )
 
     highest = np.zeros((count, description.n))
     seen = np.zeros_like(highest)
@@ -125,12 +129,16 @@ def torque_peaks(
 
     # First with an error of half the distance to the limit, which decides most cells, then with the tolerance.
     for is_last in (False, True):
-        wanted = np.full_like(seen, _TOLERANCE) if is_last else np.maximum((1 - seen) / 2, _TOLERANCE)
+        wanted = (
+            np.full_like(seen, _TOLERANCE) if is_last else np.maximum((1 - seen) / 2, _TOLERANCE)
+        )
         # Samples N of a cell of width w with which the error is the wanted one: (w / (N - 1))^4 / 4! D.
         steps = width[:, None] * (fourth / (factorial(ORDER) * wanted)) ** (1 / ORDER)
         steps = np.where(proved, 0.0, steps).max(axis=1)
         # Rounded up to powers of sqrt(2), so that cells are computed together.
-        samples = np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, _MOST_SAMPLES))) / 2).astype(int) + 2
+        samples = (
+            np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, _MOST_SAMPLES))) / 2).astype(int) + 2
+        )
         # More samples do not help where dry friction alone leaves the bound wide.
         coarse = np.flatnonzero(samples > _FIRST_SAMPLES)
         for N in np.unique(samples[coarse]).tolist():
@@ -140,7 +148,9 @@ def torque_peaks(
 
     cell = highest.argmax(axis=0)
     joints = np.arange(description.n)
-    return TorquePeaks(highest[cell, joints], times[cell, joints], seen.max(axis=0), np.asarray(proved.all(axis=0)))
+    return TorquePeaks(
+        highest[cell, joints], times[cell, joints], seen.max(axis=0), np.asarray(proved.all(axis=0))
+    )
 
 
 def _least_speeds(cells: Pieces) -> Array:
@@ -182,7 +192,9 @@ def _largest(y: Array) -> tuple[Array, Array]:
     """Return the largest values between samples (C, N, n) of cells, and where, in steps: shape (C, n)."""
     peaks, places = cubic_peaks(y)
     best = peaks.argmax(axis=1)[:, None]
-    return np.take_along_axis(peaks, best, axis=1)[:, 0], np.take_along_axis(places, best, axis=1)[:, 0]
+    return np.take_along_axis(peaks, best, axis=1)[:, 0], np.take_along_axis(places, best, axis=1)[
+        :, 0
+    ]
 
 
 def cubic_peaks(y: Array) -> tuple[Array, Array]:

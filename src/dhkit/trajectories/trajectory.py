@@ -81,7 +81,11 @@ class Trajectory:
         if self.payload is not None and not isinstance(self.payload, Payload):
             raise TypeError(f"payload is {self.payload!r}; expected Payload(mass, com, inertia)")
         pieces = Pieces.of(self.breaks, self.coefficients, self.description.n)
-        for name, value in (("breaks", pieces.breaks), ("coefficients", pieces.coefficients), ("pieces", pieces)):
+        for name, value in (
+            ("breaks", pieces.breaks),
+            ("coefficients", pieces.coefficients),
+            ("pieces", pieces),
+        ):
             object.__setattr__(self, name, value)
 
     @property
@@ -139,7 +143,9 @@ class Trajectory:
         """Return the derivatives of the accelerations, shape (..., n), as :meth:`qd`."""
         return self._derivative(t, 3, side)
 
-    def tau(self, t: ArrayLike, friction: bool | Friction | None = None, side: Side = "right") -> Array:
+    def tau(
+        self, t: ArrayLike, friction: bool | Friction | None = None, side: Side = "right"
+    ) -> Array:
         """Return joint torques by inverse dynamics with the payload, shape (..., n), N m and N.
 
         Parameters
@@ -162,9 +168,13 @@ class Trajectory:
         qd = self.qd(t, side)
         qdd = self.qdd(t, side)
         chosen = self.friction if friction is None else friction
-        return inverse_dynamics(self.loaded, q, qd, qdd, friction=False if chosen is None else chosen)
+        return inverse_dynamics(
+            self.loaded, q, qd, qdd, friction=False if chosen is None else chosen
+        )
 
-    def carrying(self, payload: Payload | None = None, friction: bool | Friction | None = None) -> Trajectory:
+    def carrying(
+        self, payload: Payload | None = None, friction: bool | Friction | None = None
+    ) -> Trajectory:
         """Return the same motion with another payload and friction, none unless given; without the report."""
         return replace(self, report=None, payload=payload, friction=Friction.chosen(friction))
 
@@ -206,7 +216,9 @@ class Trajectory:
             raise ValueError(
                 f"rate is {rate:g}: {rate * self.duration:.3g} samples; expected {_MOST_SAMPLES:g} at most"
             )
-        return np.append(np.arange(max(int(np.ceil(self.duration * rate - _SAME_TIME)), 1)) / rate, self.duration)
+        return np.append(
+            np.arange(max(int(np.ceil(self.duration * rate - _SAME_TIME)), 1)) / rate, self.duration
+        )
 
     def slowed(self, c: float) -> Trajectory:
         """Return the same path c times as slow, q(t / c), without the report.
@@ -249,7 +261,9 @@ class Trajectory:
             ("friction", self.friction, other.friction),
         ):
             if own != theirs:
-                raise ValueError(f"{what} is {own} and then {theirs}; expected one: .carrying(...) sets it")
+                raise ValueError(
+                    f"{what} is {own} and then {theirs}; expected one: .carrying(...) sets it"
+                )
         end = self.q(self.duration)
         start = other.q(0.0)
         apart = np.flatnonzero(np.abs(end - start) > _JOIN_TOLERANCE)
@@ -258,7 +272,9 @@ class Trajectory:
             name = self.description.joints[i].name
             slides = bool(self.description.numbers.prismatic[i])
             here, there = (joint_text(x, slides=slides, digits=9) for x in (end[i], start[i]))
-            raise ValueError(f"{name} ends at {here} and goes on from {there}; expected the same value")
+            raise ValueError(
+                f"{name} ends at {here} and goes on from {there}; expected the same value"
+            )
         return self._moved(*join(self.pieces, other.pieces))
 
     @classmethod
@@ -326,7 +342,9 @@ class Trajectory:
     @classmethod
     def load(cls, path: str | Path, robot: Robot | None = None) -> Trajectory:
         """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`. A robot may be an arm."""
-        motion: Trajectory = format_function("load_trajectory")(path, None if robot is None else description_of(robot))
+        motion: Trajectory = format_function("load_trajectory")(
+            path, None if robot is None else description_of(robot)
+        )
         return motion
 
     @classmethod
@@ -339,7 +357,9 @@ class Trajectory:
     ) -> Trajectory:
         """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`. A robot may be an arm."""
         read_samples = format_function("read_samples")
-        motion: Trajectory = read_samples(path, description_of(robot), degrees=degrees, columns=columns)
+        motion: Trajectory = read_samples(
+            path, description_of(robot), degrees=degrees, columns=columns
+        )
         return motion
 
     def __eq__(self, other: object) -> bool:

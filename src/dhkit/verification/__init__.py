@@ -5,4 +5,12 @@ from dhkit.verification.foreign import verify_urdf
 from dhkit.verification.states import JointStates, random_motions, random_states
 from dhkit.verification.verification_report import Agreement, VerificationReport
 
-__all__ = ["Agreement", "JointStates", "VerificationReport", "random_motions", "random_states", "verify", "verify_urdf"]
+__all__ = [
+    "Agreement",
+    "JointStates",
+    "VerificationReport",
+    "random_motions",
+    "random_states",
+    "verify",
+    "verify_urdf",
+]

@@ -82,7 +82,10 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
                 f" {description.reach:.3g} m: errors of dynamics may be {scale:.1e} times as large as otherwise"
             )
         of_dynamics = _dynamics(description, reference, notes)
-        comparisons += [comparison._replace(tolerance=scale * comparison.tolerance) for comparison in of_dynamics]
+        comparisons += [
+            comparison._replace(tolerance=scale * comparison.tolerance)
+            for comparison in of_dynamics
+        ]
     import pinocchio as pin
 
     return VerificationReport(
@@ -125,8 +128,12 @@ def _kinematics(description: Description, reference: PinocchioResults) -> Iterat
     tool = kinematics.forward_kinematics(description, q)
     ours = np.concatenate([frames, tool[:, None]], axis=1)
     theirs = reference.frames([*(f"dh{i}" for i in range(description.n + 1)), "tool"])
-    yield Comparison("frame positions", largest(ours[..., :3, 3] - theirs[..., :3, 3]) / size, _FRAME_TOLERANCE)
-    yield Comparison("frame rotations", largest(ours[..., :3, :3] - theirs[..., :3, :3]), _FRAME_TOLERANCE)
+    yield Comparison(
+        "frame positions", largest(ours[..., :3, 3] - theirs[..., :3, 3]) / size, _FRAME_TOLERANCE
+    )
+    yield Comparison(
+        "frame rotations", largest(ours[..., :3, :3] - theirs[..., :3, :3]), _FRAME_TOLERANCE
+    )
     for frame in ("world", "tool"):
         J = kinematics.jacobian(description, q, frame)
         difference = J - reference.jacobian("tool", in_world=frame == "world")
@@ -134,7 +141,9 @@ def _kinematics(description: Description, reference: PinocchioResults) -> Iterat
         yield Comparison(f"Jacobian ({frame})", error, _JACOBIAN_TOLERANCE)
 
 
-def _dynamics(description: Description, reference: PinocchioResults, notes: list[str]) -> Iterator[Comparison]:
+def _dynamics(
+    description: Description, reference: PinocchioResults, notes: list[str]
+) -> Iterator[Comparison]:
     """Yield the comparisons of dynamics; a note is appended if forward dynamics cannot be compared."""
     q, qd, qdd = reference.motion
 
@@ -152,7 +161,9 @@ def _dynamics(description: Description, reference: PinocchioResults, notes: list
     yield _relative("Coriolis matrix C", our_C, C, floors.C, vectors=2)
     yield _relative("C qd", our_C_qd, C_qd, floors.h, vectors=2)
     yield _relative("gravity torque g", dynamics.gravity_torque(description, q), g, floors.g)
-    yield _relative("bias C qd + g", dynamics.bias(description, q, qd), C_qd + g, floors.bias, vectors=2)
+    yield _relative(
+        "bias C qd + g", dynamics.bias(description, q, qd), C_qd + g, floors.bias, vectors=2
+    )
 
     our_tau = dynamics.inverse_dynamics(description, q, qd, qdd)
     yield _relative("inverse dynamics tau", our_tau, tau, floors.tau, vectors=3)
@@ -173,7 +184,9 @@ def _dynamics(description: Description, reference: PinocchioResults, notes: list
     yield _relative("regressor Y", Y, reference.regressor(), floors.Y, vectors=3)
 
 
-def _relative(quantity: str, ours: Array, theirs: Array, floor: Array | float = 0.0, vectors: int = 1) -> Comparison:
+def _relative(
+    quantity: str, ours: Array, theirs: Array, floor: Array | float = 0.0, vectors: int = 1
+) -> Comparison:
     """Return the comparison of a quantity of dynamics by its relative error."""
     return Comparison(quantity, relative_error(ours, theirs, floor), TOLERANCE, vectors)
 

@@ -35,7 +35,9 @@ def differences(description: Description, model: PinocchioModel, tolerance: floa
     reach = max(1.0, description.reach)
     ours = _screws(description)
     theirs = _model_screws(model)
-    different = [i for i in range(description.n) if _distance(ours[i], theirs[i], reach) > tolerance]
+    different = [
+        i for i in range(description.n) if _distance(ours[i], theirs[i], reach) > tolerance
+    ]
     if different:
         yield from _axes(description, ours, theirs, different[0], reach, tolerance)
     elif all(joint.bodies for joint in description.joints):
@@ -46,7 +48,9 @@ def _screws(description: Description) -> Array:
     """Return each joint's axis at zero as linear velocity of the world's origin and angular velocity, shape (n, 6)."""
     frames = list(world_to_frames(description, np.zeros(description.n)))
     screws = []
-    for T, is_prismatic in zip(carrying(description.convention, frames), description.numbers.prismatic, strict=True):
+    for T, is_prismatic in zip(
+        carrying(description.convention, frames), description.numbers.prismatic, strict=True
+    ):
         z = T[:3, 2]
         p = T[:3, 3]
         # Prismatic: (z; 0). Revolute, about z through p: (p x z; z).
@@ -113,7 +117,9 @@ def _zero_offset(ours: Array, theirs: Array, k: int, reach: float) -> tuple[floa
     grid = np.linspace(-np.pi, np.pi, _STEPS)
     best = min(grid, key=distance)
     step = grid[1] - grid[0]
-    found = minimize_scalar(distance, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-12})
+    found = minimize_scalar(
+        distance, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-12}
+    )
     return float(found.x), float(found.fun)
 
 
@@ -144,7 +150,9 @@ class _WorldBody(NamedTuple):
     """Inertia about the centre of mass, shape (3, 3), kg m^2."""
 
 
-def _bodies(description: Description, table: PinocchioModel, urdf: PinocchioModel, tolerance: float) -> Iterator[str]:
+def _bodies(
+    description: Description, table: PinocchioModel, urdf: PinocchioModel, tolerance: float
+) -> Iterator[str]:
     """Yield a sentence for each difference of masses, centres of mass and inertias."""
     reach = max(1.0, description.reach)
     pairs = list(zip(_world_bodies(table), _world_bodies(urdf), strict=True))

@@ -12,7 +12,14 @@ import numpy as np
 from dhkit import dynamics, kinematics
 from dhkit.description import Array, Description, pose_parts, takes_robot
 from dhkit.errors import ModelError
-from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, read_chain, tip_in_base
+from dhkit.model.urdf_chain import (
+    BASE_FRAME,
+    TIP_FRAME,
+    Chain,
+    chain_model,
+    read_chain,
+    tip_in_base,
+)
 from dhkit.verification.comparison import Comparison, largest, worst
 from dhkit.verification.differences import differences
 from dhkit.verification.measure import Floors, relative_error
@@ -146,7 +153,9 @@ def _rounding_of_angles(chain: Chain, q: Array, reach: float) -> float:
     if not designed.tree.changes:
         return 0.0
     states = q[:_ROUNDING_STATES]
-    difference = np.array([tip_in_base(designed, state) - tip_in_base(chain, state) for state in states])
+    difference = np.array(
+        [tip_in_base(designed, state) - tip_in_base(chain, state) for state in states]
+    )
     difference[:, :3, 3] /= reach
     return float(np.abs(difference).max())
 
@@ -179,13 +188,18 @@ def _constant_offsets(ours: Array, theirs: Array) -> Iterator[_ConstantOffset]:
     """Yield the constant transforms at the tool and at the base between two tools, shape (N, 4, 4) each."""
     # theirs = ours X at the tool, or theirs = X ours at the base, with a constant X
     inverse = np.linalg.inv(ours)
-    for frame, offsets in ((_OffsetFrame.TOOL, inverse @ theirs), (_OffsetFrame.BASE, theirs @ inverse)):
+    for frame, offsets in (
+        (_OffsetFrame.TOOL, inverse @ theirs),
+        (_OffsetFrame.BASE, theirs @ inverse),
+    ):
         variation = np.abs(offsets - offsets[0]).max()
         if variation < _CONSTANT:
             yield _ConstantOffset(frame, offsets[0])
 
 
-def _dynamics(description: Description, reference: PinocchioResults, tolerance: float) -> Iterator[Comparison]:
+def _dynamics(
+    description: Description, reference: PinocchioResults, tolerance: float
+) -> Iterator[Comparison]:
     """Yield the comparisons of M, g and tau; errors are relative to the table's."""
     q, qd, qdd = reference.motion
     M = dynamics.mass_matrix(description, q)
@@ -193,7 +207,9 @@ def _dynamics(description: Description, reference: PinocchioResults, tolerance: 
     tau = dynamics.inverse_dynamics(description, q, qd, qdd)
     floors = Floors.of(description, M, qd, qdd, tau)
     yield Comparison("mass matrix M", relative_error(reference.mass_matrix(), M), tolerance)
-    yield Comparison("gravity torque g", relative_error(reference.gravity_torque(), g, floors.g), tolerance)
+    yield Comparison(
+        "gravity torque g", relative_error(reference.gravity_torque(), g, floors.g), tolerance
+    )
     error = relative_error(reference.inverse_dynamics(), tau, floors.tau)
     yield Comparison("inverse dynamics tau", error, tolerance, 3)
 
@@ -204,7 +220,11 @@ def _limits(description: Description, chain: Chain) -> Iterator[str]:
     for i, (joint, name) in enumerate(zip(description.joints, chain.names, strict=True)):
         own = (numbers.lower[i], numbers.upper[i])
         theirs = chain.limits.get(name)
-        if joint.limits is not None and theirs is not None and not np.allclose(own, theirs, atol=1e-3):
+        if (
+            joint.limits is not None
+            and theirs is not None
+            and not np.allclose(own, theirs, atol=1e-3)
+        ):
             yield (
                 f"joint {i + 1}: limits {theirs[0]:.4g} to {theirs[1]:.4g} in the URDF,"
                 f" {own[0]:.4g} to {own[1]:.4g} in the table"

@@ -18,7 +18,9 @@ class PinocchioResults:
     it is added to M, and to the quantities that depend on M.
     """
 
-    def __init__(self, model: PinocchioModel, motion: JointStates, coupling: Array | None = None) -> None:
+    def __init__(
+        self, model: PinocchioModel, motion: JointStates, coupling: Array | None = None
+    ) -> None:
         self.model = model
         self.motion = motion
         self.coupling = np.zeros((model.nv, model.nv)) if coupling is None else coupling
@@ -27,7 +29,11 @@ class PinocchioResults:
     @property
     def notes(self) -> list[str]:
         """One sentence for each addition to Pinocchio's results."""
-        return ["the inertia of coupled drives was added to Pinocchio's M"] if self.coupling.any() else []
+        return (
+            ["the inertia of coupled drives was added to Pinocchio's M"]
+            if self.coupling.any()
+            else []
+        )
 
     def frames(self, names: Sequence[str]) -> Array:
         """Return frames in the world, shape (N, names, 4, 4)."""
@@ -66,13 +72,18 @@ class PinocchioResults:
         """Return Coriolis matrices C(q, qd) of Christoffel symbols, shape (N, n, n); C qd is in N m and N."""
         import pinocchio as pin
 
-        return self._each(lambda q, qd, qdd: pin.computeCoriolisMatrix(self.model, self._data, q, qd), (self.n, self.n))
+        return self._each(
+            lambda q, qd, qdd: pin.computeCoriolisMatrix(self.model, self._data, q, qd),
+            (self.n, self.n),
+        )
 
     def gravity_torque(self) -> Array:
         """Return gravity torques g(q), shape (N, n), N m and N."""
         import pinocchio as pin
 
-        return self._each(lambda q, qd, qdd: pin.computeGeneralizedGravity(self.model, self._data, q), (self.n,))
+        return self._each(
+            lambda q, qd, qdd: pin.computeGeneralizedGravity(self.model, self._data, q), (self.n,)
+        )
 
     def inverse_dynamics(self) -> Array:
         """Return joint torques of the states' accelerations, without friction, shape (N, n), N m and N."""
@@ -87,17 +98,23 @@ class PinocchioResults:
 
         if self.coupling.any():
             # M qdd = tau - (C qd + g)
-            bias = self._each(lambda q, qd, qdd: pin.nonLinearEffects(self.model, self._data, q, qd), (self.n,))
+            bias = self._each(
+                lambda q, qd, qdd: pin.nonLinearEffects(self.model, self._data, q, qd), (self.n,)
+            )
             qdd = np.linalg.solve(self.mass_matrix(), (tau - bias)[..., None])
             return np.asarray(qdd[..., 0])
         torques = iter(tau)
-        return self._each(lambda q, qd, qdd: pin.aba(self.model, self._data, q, qd, next(torques)), (self.n,))
+        return self._each(
+            lambda q, qd, qdd: pin.aba(self.model, self._data, q, qd, next(torques)), (self.n,)
+        )
 
     def kinetic_energy(self) -> Array:
         """Return kinetic energies, shape (N,), J."""
         import pinocchio as pin
 
-        K = self._each(lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ())
+        K = self._each(
+            lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ()
+        )
         of_couplings = np.einsum("ni,ij,nj->n", self.motion.qd, self.coupling, self.motion.qd) / 2
         return np.asarray(K + of_couplings)
 
@@ -105,7 +122,9 @@ class PinocchioResults:
         """Return potential energies, shape (N,), J."""
         import pinocchio as pin
 
-        return self._each(lambda q, qd, qdd: pin.computePotentialEnergy(self.model, self._data, q), ())
+        return self._each(
+            lambda q, qd, qdd: pin.computePotentialEnergy(self.model, self._data, q), ()
+        )
 
     def regressor(self) -> Array:
         """Return Y with tau = Y p, p the 10 inertial parameters of each link in its DH frame, shape (N, n, 10 n).
@@ -153,7 +172,9 @@ class PinocchioResults:
         """The number of joints."""
         return int(self.model.nv)
 
-    def _each(self, answer: Callable[[Array, Array, Array], object], shape: tuple[int, ...]) -> Array:
+    def _each(
+        self, answer: Callable[[Array, Array, Array], object], shape: tuple[int, ...]
+    ) -> Array:
         """Return the answers of this shape for the states (q, qd, qdd), shape (N, *shape)."""
         results = []
         for state in zip(*self.motion, strict=True):

@@ -24,7 +24,9 @@ class JointStates(NamedTuple):
     qdd: Array
 
     def __repr__(self) -> str:
-        return repr_line("JointStates", counted(len(self.q), "state"), counted(self.q.shape[-1], "joint"))
+        return repr_line(
+            "JointStates", counted(len(self.q), "state"), counted(self.q.shape[-1], "joint")
+        )
 
 
 @takes_robot

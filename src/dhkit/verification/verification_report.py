@@ -59,7 +59,9 @@ class Agreement:
     def __repr__(self) -> str:
         verdict = "agrees" if self.ok else "DISAGREES"
         most = f"{self.tolerance:.0e}"
-        return repr_line("Agreement", self.quantity, f"{verdict}, error {self.error:.1e} of at most {most}")
+        return repr_line(
+            "Agreement", self.quantity, f"{verdict}, error {self.error:.1e} of at most {most}"
+        )
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,11 @@ class VerificationReport:
 
     def __repr__(self) -> str:
         wrong = [agreement.quantity for agreement in self.agreements if not agreement.ok]
-        summary = f"DISAGREES in {', '.join(wrong)}" if wrong else f"{len(self.agreements)} quantities agree"
+        summary = (
+            f"DISAGREES in {', '.join(wrong)}"
+            if wrong
+            else f"{len(self.agreements)} quantities agree"
+        )
         return repr_line("VerificationReport", self.robot, f"{summary}, {self.samples} states")
 
     def _repr_html_(self) -> str:
@@ -121,7 +127,9 @@ class VerificationReport:
             )
             for one in worst
         ]
-        table = html_table(("quantity", "worst error", "at most", ""), rows, align="lrrl", most=_MAX_SHOWN)
+        table = html_table(
+            ("quantity", "worst error", "at most", ""), rows, align="lrrl", most=_MAX_SHOWN
+        )
         return html_block(self._title, table, html_lines(self.notes))
 
     @property
@@ -142,7 +150,11 @@ class VerificationReport:
     def markdown(self) -> str:
         """Return the report as Markdown."""
         lines = [f"# {_plain(self._title)}", ""]
-        for row in [("quantity", "worst error", "at most", "", "worst state"), ("---",) * 5, *self._rows]:
+        for row in [
+            ("quantity", "worst error", "at most", "", "worst state"),
+            ("---",) * 5,
+            *self._rows,
+        ]:
             cells = [_plain(cell) for cell in row]
             lines.append(f"| {' | '.join(cells)} |")
         lines.append("")

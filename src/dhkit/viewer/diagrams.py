@@ -102,7 +102,9 @@ def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
                 near.append((float(limits[k]), i))
     shared = [limit for limit, _ in near]
     for limit, i in near:
-        axes.axhline(limit, color=SHARED_COLOR if shared.count(limit) > 1 else joint_color(i), **LIMIT_STYLE)
+        axes.axhline(
+            limit, color=SHARED_COLOR if shared.count(limit) > 1 else joint_color(i), **LIMIT_STYLE
+        )
     low = min([low, *(limit for limit, _ in near)])
     high = max([high, *(limit for limit, _ in near)])
     margin = _MARGIN * max(high - low, span)
@@ -129,7 +131,8 @@ def draw_legend(figure: Figure, description: Description, others: tuple[Any, ...
 
     names = [joint.name for joint in description.joints]
     joints = [
-        Line2D([], [], color=joint_color(i), ls=joint_style(i), lw=1.8, label=name) for i, name in enumerate(names)
+        Line2D([], [], color=joint_color(i), ls=joint_style(i), lw=1.8, label=name)
+        for i, name in enumerate(names)
     ]
     figure.legend(
         handles=[*joints, *others],

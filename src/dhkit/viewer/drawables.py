@@ -53,7 +53,9 @@ def part_object(part: Part, name: str) -> Lowered:
     """
     meshcat = _meshcat()
     side = _BOTH_SIDES if isinstance(part.geometry, Mesh) else _FRONT_SIDE
-    material = meshcat.MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side)
+    material = meshcat.MeshPhongMaterial(
+        color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side
+    )
     return _lowered("Mesh", _geometry(part), material, name)
 
 
@@ -64,7 +66,9 @@ def part_transform(part: Part) -> Array:
     """
     T = part.T_link_part.copy()
     if isinstance(part.geometry, Mesh):
-        T[:3, :3] *= [float(factor) for factor in part.geometry.scale]  # may mirror: both sides are drawn
+        T[:3, :3] *= [
+            float(factor) for factor in part.geometry.scale
+        ]  # may mirror: both sides are drawn
     if isinstance(part.geometry, Cylinder | Capsule):
         T = np.matmul(T, _Y_TO_Z)
     return T
@@ -82,7 +86,9 @@ def triad_object(length: float, name: str) -> Lowered:
     """
     meshcat = _meshcat()
     vertices, faces = _arrow()
-    along = [np.roll(vertices, axis, axis=1) for axis in range(3)]  # a cyclic change of axes keeps the triangles' sense
+    along = [
+        np.roll(vertices, axis, axis=1) for axis in range(3)
+    ]  # a cyclic change of axes keeps the triangles' sense
     geometry = meshcat.TriangularMeshGeometry(
         length * np.concatenate(along),
         np.concatenate([faces + axis * len(vertices) for axis in range(3)]),
@@ -124,12 +130,19 @@ def grid_object(size: float, name: str) -> Lowered:
     x, y = np.meshgrid(along, across)
     line = np.stack([x, y, np.zeros_like(x)], axis=-1)
     segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 3)
-    segments = segments[np.linalg.norm(segments, axis=2).min(axis=1) < half]  # the corners are fully faded
+    segments = segments[
+        np.linalg.norm(segments, axis=2).min(axis=1) < half
+    ]  # the corners are fully faded
     points = np.concatenate([segments, segments[..., [1, 0, 2]]]).reshape(-1, 3)
     opacity = np.clip(1 - np.hypot(points[:, 0], points[:, 1]) / half, 0, 1)
     colors = np.concatenate([np.ones((3, len(points))), opacity[None]])
     geometry = meshcat.PointsGeometry(points.T.astype(np.float32), colors.astype(np.float32))
-    return _lowered("LineSegments", geometry, meshcat.LineBasicMaterial(vertexColors=True, transparent=True), name)
+    return _lowered(
+        "LineSegments",
+        geometry,
+        meshcat.LineBasicMaterial(vertexColors=True, transparent=True),
+        name,
+    )
 
 
 def _meshcat() -> Any:
@@ -177,7 +190,9 @@ def _mesh(part: Part, shape: Mesh) -> Any:
     So a COLLADA file has its unit and up axis applied, and the page opens nothing that a file names.
     """
     if part.file is None:
-        raise ModelError(f"link {part.link}: mesh {shape.path!r} has no folder; expected a robot read from a file")
+        raise ModelError(
+            f"link {part.link}: mesh {shape.path!r} has no folder; expected a robot read from a file"
+        )
     try:
         mesh = read_mesh(part.file)
         is_binary = mesh_header(part.file).format == "stl"
@@ -195,7 +210,12 @@ def _lathe(outline: Array) -> Any:
     class Lathe(_meshcat().Geometry):  # type: ignore[misc]  # meshcat-python has none
         def lower(self, object_data: Lowered) -> Lowered:
             points = [{"x": float(x), "y": float(y)} for x, y in outline]
-            return {"uuid": self.uuid, "type": "LatheGeometry", "points": points, "segments": _ROUND_SIDES}
+            return {
+                "uuid": self.uuid,
+                "type": "LatheGeometry",
+                "points": points,
+                "segments": _ROUND_SIDES,
+            }
 
     return Lathe()
 
@@ -204,7 +224,9 @@ def _arc(radius: float, height: float, start: float, stop: float) -> Array:
     """Return points of a circle between two latitudes, degrees, shape (k, 2), m: distance from the axis, and height."""
     steps = round(abs(stop - start) / 360 * _ROUND_SIDES)
     latitude = np.radians(np.linspace(start, stop, steps + 1))
-    return np.stack([radius * np.maximum(np.cos(latitude), 0), height + radius * np.sin(latitude)], axis=1)
+    return np.stack(
+        [radius * np.maximum(np.cos(latitude), 0), height + radius * np.sin(latitude)], axis=1
+    )
 
 
 def _arrow() -> tuple[Array, np.ndarray[Any, np.dtype[np.uint32]]]:
@@ -212,12 +234,16 @@ def _arrow() -> tuple[Array, np.ndarray[Any, np.dtype[np.uint32]]]:
     turn = math.tau * np.arange(_ARROW_SIDES) / _ARROW_SIDES
     rings = [(0.0, 0.02), (0.8, 0.02), (0.8, 0.055), (1.0, 0.0)]
     vertices = np.concatenate(
-        [np.stack([np.full(_ARROW_SIDES, x), r * np.cos(turn), r * np.sin(turn)], axis=1) for x, r in rings]
+        [
+            np.stack([np.full(_ARROW_SIDES, x), r * np.cos(turn), r * np.sin(turn)], axis=1)
+            for x, r in rings
+        ]
     )
     i = np.arange(_ARROW_SIDES)
     j = (i + 1) % _ARROW_SIDES
     bands = [
-        k * _ARROW_SIDES + np.array([[i, j, j + _ARROW_SIDES], [i, j + _ARROW_SIDES, i + _ARROW_SIDES]])
+        k * _ARROW_SIDES
+        + np.array([[i, j, j + _ARROW_SIDES], [i, j + _ARROW_SIDES, i + _ARROW_SIDES]])
         for k in range(3)
     ]
     faces = np.concatenate([band.transpose(0, 2, 1).reshape(-1, 3) for band in bands])

@@ -116,9 +116,15 @@ class Exportable(ABC):
             shown.q,
             motions,
             caption=caption,
-            links={_text("links", text): _address(address) for text, address in (links or {}).items()},
+            links={
+                _text("links", text): _address(address) for text, address in (links or {}).items()
+            },
             ghosts=[(_text("names", text), color) for text, color in shown.ghost_names],
-            overlays=[(text, color) for slot, text, color in _OVERLAYS if len(messages.get(slot, b"")) > _EMPTY_LENGTH],
+            overlays=[
+                (text, color)
+                for slot, text, color in _OVERLAYS
+                if len(messages.get(slot, b"")) > _EMPTY_LENGTH
+            ],
         )
         messages.pop(Slot.MOTION, None)  # the page works out poses and motions itself
         return offline_page([*messages.values()], title, data)
@@ -147,7 +153,9 @@ class Exportable(ABC):
         ...     print(page.name)
         arm.html
         """
-        text = self.html(interactive=interactive, motions=motions, title=title, caption=caption, links=links)
+        text = self.html(
+            interactive=interactive, motions=motions, title=title, caption=caption, links=links
+        )
         write_atomically(path, text)
         return Path(path)
 
@@ -161,14 +169,21 @@ class Exportable(ABC):
         """
         shown = self.snapshot()
         return picture(
-            shown.description, shown.q, size=size, frames=shown.frames, ghosts=shown.ghosts, path=shown.trace
+            shown.description,
+            shown.q,
+            size=size,
+            frames=shown.frames,
+            ghosts=shown.ghosts,
+            path=shown.trace,
         )
 
     def save_png(self, path: str | Path, size: tuple[int, int] = (960, 720)) -> Path:
         """Write :meth:`picture` as PNG and return the path."""
         return write_png(self.picture(size), path)
 
-    def save_gif(self, path: str | Path, size: tuple[int, int] = (480, 360), rate: float = 15.0) -> Path:
+    def save_gif(
+        self, path: str | Path, size: tuple[int, int] = (480, 360), rate: float = 15.0
+    ) -> Path:
         """Write the motion that plays as a GIF of ``rate`` pictures a second; return the path.
 
         Raises
@@ -180,7 +195,13 @@ class Exportable(ABC):
         if shown.motion is None:
             raise ValueError("no motion is on show; expected view.play(motion) before")
         return write_motion_gif(
-            shown.description, shown.motion, path, rate=rate, size=size, frames=shown.frames, ghosts=shown.ghosts
+            shown.description,
+            shown.motion,
+            path,
+            rate=rate,
+            size=size,
+            frames=shown.frames,
+            ghosts=shown.ghosts,
         )
 
 
@@ -194,6 +215,11 @@ def _address(value: object) -> str:
     """Return an address that a page may lead to."""
     address = _text("links", value)
     plain = "".join(address.split())  # browsers pass over white space in a scheme
-    if not re.match(r"(https?://|mailto:|[^:]*$|[^:/?#]*[/?#])", plain) or not address.isprintable():
-        raise ValueError(f"links: found {address[:60]!r}; expected a relative address, or one of http, https or mailto")
+    if (
+        not re.match(r"(https?://|mailto:|[^:]*$|[^:/?#]*[/?#])", plain)
+        or not address.isprintable()
+    ):
+        raise ValueError(
+            f"links: found {address[:60]!r}; expected a relative address, or one of http, https or mailto"
+        )
     return address

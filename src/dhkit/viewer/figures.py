@@ -116,7 +116,14 @@ def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Fig
         axes = figure.add_subplot(grid[row, 0])
         for i in joints:
             style = ("-", "--", ":")[i // len(CURVE_COLORS) % 3]
-            axes.plot(times, unit * q[:, i], style, color=joint_color(i), lw=1.8, label=description.joints[i].name)
+            axes.plot(
+                times,
+                unit * q[:, i],
+                style,
+                color=joint_color(i),
+                lw=1.8,
+                label=description.joints[i].name,
+            )
         axes.margins(x=0.01)
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
         style_axes(axes, label)
@@ -133,19 +140,44 @@ def draw_path(axes: Any, description: Description, q: Array) -> None:
         frames = world_to_frames(description, state)
         tool = world_to_tool(description, state)
         lines.append(skeleton(description, frames, tool))
-        axes.plot(*lines[-1].T, color=color, lw=2.5, solid_capstyle="round", solid_joinstyle="round", label=label)
+        axes.plot(
+            *lines[-1].T,
+            color=color,
+            lw=2.5,
+            solid_capstyle="round",
+            solid_joinstyle="round",
+            label=label,
+        )
     axes.plot(*path.T, color=PATH_COLOR, lw=1.8, label="tool")
     set_space_limits(axes, np.concatenate([*lines, path]), margin=0.04 * scene_size(description))
     axes.legend(loc="upper left", frameon=False, fontsize=9)
 
 
 def _draw_links(axes: Any, description: Description, frames: Array, line: Array) -> None:
-    axes.plot(*line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85, zorder=2)
+    axes.plot(
+        *line.T,
+        color=LINK_COLOR,
+        lw=5,
+        solid_capstyle="round",
+        solid_joinstyle="round",
+        alpha=0.85,
+        zorder=2,
+    )
     # Joint i moves about z of the frame before it in the standard table, about its own in the modified one.
     shift = 0 if description.convention is Convention.STANDARD else 1
     origins = frames[shift : shift + description.n, :3, 3]
-    for chosen, marker in ((~description.numbers.prismatic, "o"), (description.numbers.prismatic, "s")):
-        style = {"marker": marker, "ms": 8, "mfc": "white", "mec": LINK_COLOR, "mew": 1.8, "ls": "none"}
+    for chosen, marker in (
+        (~description.numbers.prismatic, "o"),
+        (description.numbers.prismatic, "s"),
+    ):
+        style = {
+            "marker": marker,
+            "ms": 8,
+            "mfc": "white",
+            "mec": LINK_COLOR,
+            "mew": 1.8,
+            "ls": "none",
+        }
         axes.plot(*origins[chosen].T, zorder=3, **style)
 
 
@@ -162,8 +194,17 @@ def _draw_triads(axes: Any, description: Description, T: Array) -> None:
         axes.plot([], [], [], color=color, lw=1.5, label="xyz"[k])
     halo = [withStroke(linewidth=3, foreground="white")]
     for label in frame_labels(description):
-        axes.text(*T[label.frame, :3, 3], f"   {label.text}", fontsize=9, va="bottom", path_effects=halo, zorder=6)
-    axes.legend(loc="upper left", frameon=False, fontsize=9, ncols=3, handlelength=1, columnspacing=1)
+        axes.text(
+            *T[label.frame, :3, 3],
+            f"   {label.text}",
+            fontsize=9,
+            va="bottom",
+            path_effects=halo,
+            zorder=6,
+        )
+    axes.legend(
+        loc="upper left", frameon=False, fontsize=9, ncols=3, handlelength=1, columnspacing=1
+    )
 
 
 def skeleton(description: Description, frames: Array, tool: Array) -> Array:
@@ -208,9 +249,13 @@ def set_space_limits(axes: Any, points: Array, margin: float) -> None:
     low = points.min(axis=0)
     high = points.max(axis=0)
     is_flat = high[2] - low[2] <= _FLATNESS * max(float((high - low).max()), 1e-12)
-    half = np.maximum((high - low) / 2 + margin, _MIN_EDGE_SHARE * float((high - low).max() / 2 + margin))
+    half = np.maximum(
+        (high - low) / 2 + margin, _MIN_EDGE_SHARE * float((high - low).max() / 2 + margin)
+    )
     centre = (low + high) / 2
-    for set_limits, c, h in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), centre, half, strict=True):
+    for set_limits, c, h in zip(
+        (axes.set_xlim, axes.set_ylim, axes.set_zlim), centre, half, strict=True
+    ):
         set_limits(c - h, c + h)
     axes.set_box_aspect(half, zoom=_ZOOM)
     axes.view_init(elev=24, azim=-58)

@@ -65,7 +65,9 @@ class Guarded(RequestHandler):
             raise HTTPError(403, reason="Foreign Host")
         if origin is not None and origin not in [f"http://{host}" for host in self.server.hosts]:
             raise HTTPError(403, reason="Foreign Origin")
-        if not hmac.compare_digest((self.path_args or [""])[0].encode(), self.server.token.encode()):
+        if not hmac.compare_digest(
+            (self.path_args or [""])[0].encode(), self.server.token.encode()
+        ):
             raise HTTPError(403, reason="Missing token")
         connection: Any = self.request.connection
         self.server.trust(connection.stream)

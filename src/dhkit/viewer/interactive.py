@@ -48,7 +48,9 @@ def table_texts(description: Description) -> tuple[tuple[str, ...], ...]:
 def limits_state(description: Description) -> dict[str, Any]:
     """Return the limits of the joints by name, null where there is none."""
     numbers = description.numbers
-    return {name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")}
+    return {
+        name: listed(getattr(numbers, name)) for name in ("lower", "upper", "velocity", "effort")
+    }
 
 
 def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict[str, object]:
@@ -108,7 +110,11 @@ def interactive_data(
     limits = limits_state(description)
     rows = []
     for i, joint in enumerate(description.joints):
-        row = {"kind": "R" if joint.is_revolute else "P", "lower": limits["lower"][i], "upper": limits["upper"][i]}
+        row = {
+            "kind": "R" if joint.is_revolute else "P",
+            "lower": limits["lower"][i],
+            "upper": limits["upper"][i],
+        }
         rows.append(row | {name: float(getattr(numbers, name)[i]) for name in COLUMNS})
     return {
         "arm": arm_state(description),
@@ -121,7 +127,9 @@ def interactive_data(
             "tool": numbers.T_last_tool.ravel().tolist(),
         },
         "parameters": numbers.values,
-        "labels": [{"frame": label.frame, "text": label.text} for label in frame_labels(description)],
+        "labels": [
+            {"frame": label.frame, "text": label.text} for label in frame_labels(description)
+        ],
         "motions": [_motion_state(description, name, motion) for name, motion in motions.items()],
         "about": {
             "caption": caption,
@@ -149,12 +157,16 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
         checked_tau = motion.tau(checked) if has_bodies else None
         excess = exceeded_limit(description, motion.q(checked), motion.qd(checked), checked_tau)
     elif isinstance(motion, SimulationResult):
-        qd, tau = (interpolate(motion.t, rows, grid + motion.t[0]) for rows in (motion.qd, motion.tau))
+        qd, tau = (
+            interpolate(motion.t, rows, grid + motion.t[0]) for rows in (motion.qd, motion.tau)
+        )
         excess = exceeded_limit(description, motion.q, motion.qd, motion.tau)
     else:
         qd = np.gradient(sampled_q, grid, axis=0)
         given_times, given_q = check_motion(description, *motion)
-        excess = exceeded_limit(description, given_q, np.gradient(given_q, given_times, axis=0), None)
+        excess = exceeded_limit(
+            description, given_q, np.gradient(given_q, given_times, axis=0), None
+        )
     return {
         "name": name,
         "duration": float(grid[-1]),
@@ -162,7 +174,9 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
         "q": _rounded(sampled_q),
         "qd": _rounded(qd),
         "tau": None if tau is None else _rounded(tau),
-        "reference": None if reference_q is None else _rounded(interpolate(times, reference_q, grid)),
+        "reference": None
+        if reference_q is None
+        else _rounded(interpolate(times, reference_q, grid)),
         "limits": limits_state(description),
         "contacts": None,
         "excess": excess,

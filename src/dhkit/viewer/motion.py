@@ -87,15 +87,21 @@ def check_motion(description: Description, times: ArrayLike, q: ArrayLike) -> tu
     if t.ndim != 1 or len(t) < 2:
         raise ValueError(f"times has shape {t.shape}; expected (N,) with N >= 2")
     if q.shape != (len(t), description.n):
-        raise ValueError(f"q has shape {q.shape}; expected ({len(t)}, {description.n}) for {len(t)} times")
+        raise ValueError(
+            f"q has shape {q.shape}; expected ({len(t)}, {description.n}) for {len(t)} times"
+        )
     for name, array in (("times", t), ("q", q)):
         rows = np.argwhere(~np.isfinite(array))
         if len(rows):
-            raise ValueError(f"{name} has values that are not finite, the first in row {rows[0, 0]}")
+            raise ValueError(
+                f"{name} has values that are not finite, the first in row {rows[0, 0]}"
+            )
     steps_back = np.flatnonzero(np.diff(t) <= 0)
     if len(steps_back):
         k = int(steps_back[0])
-        raise ValueError(f"times do not increase: times[{k}] is {t[k]:g} s, times[{k + 1}] is {t[k + 1]:g} s")
+        raise ValueError(
+            f"times do not increase: times[{k}] is {t[k]:g} s, times[{k + 1}] is {t[k + 1]:g} s"
+        )
     return t, q
 
 
@@ -130,7 +136,9 @@ def interpolate(times: Array, rows: Array, at: Array) -> Array:
 
 def _frame_times(duration: float) -> Array:
     """Return the times of a page's frames, shape (N,), s, from 0 to a duration, s."""
-    return np.linspace(0.0, duration, int(np.clip(np.ceil(_FRAME_RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES)))
+    return np.linspace(
+        0.0, duration, int(np.clip(np.ceil(_FRAME_RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES))
+    )
 
 
 def exceeded_limit(description: Description, q: Array, qd: Array, tau: Array | None) -> str | None:
@@ -152,7 +160,9 @@ def exceeded_limit(description: Description, q: Array, qd: Array, tau: Array | N
     }
     if tau is not None:
         shares["torque"] = np.abs(tau).max(axis=0) / numbers.effort
-    share, name, joint = max((float(np.max(share)), name, int(np.argmax(share))) for name, share in shares.items())
+    share, name, joint = max(
+        (float(np.max(share)), name, int(np.argmax(share))) for name, share in shares.items()
+    )
     if share <= 1 + 1e-6:
         return None
     joint_name = description.joints[joint].name

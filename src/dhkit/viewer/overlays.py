@@ -86,7 +86,9 @@ def ghost_tints(count: int) -> NDArray[np.uint8]:
 
 def rgb_bytes(colors: Sequence[str]) -> NDArray[np.uint8]:
     """Return colors such as "#e5484d" as bytes from 0 to 255, shape (k, 3)."""
-    return np.array([list(bytes.fromhex(color[1:])) for color in colors], dtype=np.uint8).reshape(-1, 3)
+    return np.array([list(bytes.fromhex(color[1:])) for color in colors], dtype=np.uint8).reshape(
+        -1, 3
+    )
 
 
 def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -> Array:
@@ -117,7 +119,9 @@ def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -
     axes = ellipsoid.axes.reshape(-1, 3, 3)
     lengths = ellipsoid.lengths.reshape(-1, 3)
     if np.isinf(lengths).any():
-        raise ValueError("the ellipsoid is infinite in a direction that the tool cannot move in; expected a finite one")
+        raise ValueError(
+            "the ellipsoid is infinite in a direction that the tool cannot move in; expected a finite one"
+        )
     known = np.isfinite(lengths).all(axis=1)
     centers = centers[known]
     axes = axes[known]

@@ -27,6 +27,7 @@ MODULES = (
     "outlines.js",
     "overlays.js",
     "obstacles.js",
+    "person.js",
     "labels.js",
     "smooth.js",
     "quality.js",
@@ -43,6 +44,7 @@ _LAB_FILES = (
     "card.js",
     "memory.js",
     "dock.js",
+    "edge.js",
     "icons.js",
     "panels.js",
     "recording.js",
@@ -82,6 +84,7 @@ _OFFLINE_MODULES = (
     "lab/card.js",
     "lab/memory.js",
     "lab/dock.js",
+    "lab/edge.js",
     "lab/icons.js",
     "lab/dom.js",
     "lab/joints.js",
@@ -101,7 +104,8 @@ _REMOVED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
 _CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 SECURITY_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; connect-src 'self'"
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src data: blob:; connect-src 'self'"
 )
 """Policy of the live page: it loads nothing from other hosts. meshcat's bundle writes style elements."""
 
@@ -118,7 +122,9 @@ def meshcat_bundle() -> bytes:
     """
     spec = find_spec("meshcat")
     if spec is None or spec.origin is None:
-        raise ModelError("the viewer needs the package meshcat, which is not installed: pip install meshcat")
+        raise ModelError(
+            "the viewer needs the package meshcat, which is not installed: pip install meshcat"
+        )
     path = Path(spec.origin).parent / "viewer" / "dist" / "main.min.js"
     try:
         bundle = path.read_bytes()
@@ -140,14 +146,25 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     ModelError
         As :func:`meshcat_bundle`.
     """
-    names = ("index.html", "viewer.css", *MODULES, *(f"lab/{name}" for name in _LAB_FILES), "offline/kinematics.js")
-    files = {name: (f"{_CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode()) for name in names}
+    names = (
+        "index.html",
+        "viewer.css",
+        *MODULES,
+        *(f"lab/{name}" for name in _LAB_FILES),
+        "offline/kinematics.js",
+    )
+    files = {
+        name: (f"{_CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode())
+        for name in names
+    }
     files[""] = files.pop("index.html")
     files["meshcat.js"] = ("text/javascript; charset=utf-8", meshcat_bundle())
     return files
 
 
-def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str, object] | None = None) -> str:
+def offline_page(
+    messages: Sequence[bytes], title: str, interactive: Mapping[str, object] | None = None
+) -> str:
     """Return one HTML file that shows messages without a server; it makes no requests.
 
     Parameters
@@ -179,7 +196,8 @@ def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str
             '<link rel="stylesheet" href="viewer.css">': f"<style>\n{style}</style>",
             '<script src="meshcat.js"></script>': _script(meshcat_bundle().decode()),
             '<script type="module" src="main.js"></script>': _modules(modules),
-            "<!-- messages -->": _script(_json(data), ' type="application/json" id="messages"') + extra,
+            "<!-- messages -->": _script(_json(data), ' type="application/json" id="messages"')
+            + extra,
         },
     )
 
@@ -189,9 +207,12 @@ def _modules(names: Sequence[str]) -> str:
     sources = {name: _with_absolute_imports(name, _static(name)) for name in names}
     first = sources.pop("main.js")
     imports = {
-        f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=_UNQUOTED)}" for name, source in sources.items()
+        f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=_UNQUOTED)}"
+        for name, source in sources.items()
     }
-    return _script(json.dumps({"imports": imports}), ' type="importmap"') + _script(first, ' type="module"')
+    return _script(json.dumps({"imports": imports}), ' type="importmap"') + _script(
+        first, ' type="module"'
+    )
 
 
 def _with_absolute_imports(name: str, source: str) -> str:

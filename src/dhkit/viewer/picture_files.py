@@ -37,7 +37,13 @@ def _write_gif(images: Iterable[Picture], path: str | Path, rate: float) -> Path
 
     first, *others = images
     palette = first.quantize(_GIF_COLORS, dither=Image.Dither.NONE)
-    frames = [palette, *(image.quantize(_GIF_COLORS, palette=palette, dither=Image.Dither.NONE) for image in others)]
+    frames = [
+        palette,
+        *(
+            image.quantize(_GIF_COLORS, palette=palette, dither=Image.Dither.NONE)
+            for image in others
+        ),
+    ]
     # Times of a GIF are whole hundredths of a second: rounded one by one, they would add up to another duration.
     durations = 10 * np.diff(np.rint(100 / rate * np.arange(len(frames) + 1))).astype(int)
     content = io.BytesIO()
@@ -98,7 +104,9 @@ def write_motion_gif(
         )
 
     def images() -> Iterator[Picture]:
-        for k, image in enumerate(_motion_pictures(description, motion, count, size, frames, ghosts), start=1):
+        for k, image in enumerate(
+            _motion_pictures(description, motion, count, size, frames, ghosts), start=1
+        ):
             yield image
             progress(k, count)
 
@@ -120,7 +128,8 @@ def write_motion_pngs(
     digits = len(str(count))
     images = _motion_pictures(description, motion, count, size, frames, ghosts)
     return [
-        write_png(image, path.with_name(f"{path.stem}-{k:0{digits}}{path.suffix}")) for k, image in enumerate(images, 1)
+        write_png(image, path.with_name(f"{path.stem}-{k:0{digits}}{path.suffix}"))
+        for k, image in enumerate(images, 1)
     ]
 
 
@@ -139,4 +148,12 @@ def _motion_pictures(
     grid = np.linspace(0.0, times[-1], count)
     references = None if reference_q is None else interpolate(times, reference_q, grid)
     shown_q = interpolate(times, q, grid)
-    return pictures(description, shown_q, size=size, frames=frames, ghosts=ghosts, path=path, references=references)
+    return pictures(
+        description,
+        shown_q,
+        size=size,
+        frames=frames,
+        ghosts=ghosts,
+        path=path,
+        references=references,
+    )

@@ -20,7 +20,13 @@ from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
 from dhkit.viewer.drawables import grid_step
 from dhkit.viewer.overlays import AXIS_COLORS
-from dhkit.viewer.scene import PICTURE_TRIAD_SHARE, first_configuration, frame_labels, node_transforms, scene_size
+from dhkit.viewer.scene import (
+    PICTURE_TRIAD_SHARE,
+    first_configuration,
+    frame_labels,
+    node_transforms,
+    scene_size,
+)
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -119,8 +125,12 @@ def picture(
     """
     state = first_configuration(description) if q is None else joint_array(description, q)
     if state.ndim != 1 or not np.isfinite(state).all():
-        raise ValueError(f"q is {np.asarray(q).tolist()!r}; expected {description.n} finite joint values")
-    return next(pictures(description, state[None], size=size, frames=frames, ghosts=ghosts, path=path))
+        raise ValueError(
+            f"q is {np.asarray(q).tolist()!r}; expected {description.n} finite joint values"
+        )
+    return next(
+        pictures(description, state[None], size=size, frames=frames, ghosts=ghosts, path=path)
+    )
 
 
 def pictures(
@@ -147,22 +157,33 @@ def pictures(
     try:
         width, height = map(operator.index, size)
     except (TypeError, ValueError):
-        raise ValueError(f"size is {size!r}; expected width and height in px, whole numbers") from None
+        raise ValueError(
+            f"size is {size!r}; expected width and height in px, whole numbers"
+        ) from None
     if not (_MIN_EDGE <= width <= _MAX_EDGE and _MIN_EDGE <= height <= _MAX_EDGE):
-        raise ValueError(f"size is {width} x {height}; expected {_MIN_EDGE} to {_MAX_EDGE} px an edge")
+        raise ValueError(
+            f"size is {width} x {height}; expected {_MIN_EDGE} to {_MAX_EDGE} px an edge"
+        )
     solids = _solids(description)
     transforms = node_transforms(description, joint_array(description, q))
     moving: Array = np.zeros((0, 4, 4))
     if references is not None:
         moving = node_transforms(description, joint_array(description, references))
     points = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float)
-    camera = _Camera.around(description, _extent(description, solids, transforms, ghosts, points, frames), size)
+    camera = _Camera.around(
+        description, _extent(description, solids, transforms, ghosts, points, frames), size
+    )
     ground = _draw_ground(description, camera)
     for nodes, reference in zip_longest(transforms, moving):
         image = ground
-        for ghost in (*ghosts, *([] if reference is None else [Ghost(reference, _REFERENCE_COLOR)])):
+        for ghost in (
+            *ghosts,
+            *([] if reference is None else [Ghost(reference, _REFERENCE_COLOR)]),
+        ):
             with_ghost = _draw_arm(solids, ghost.transforms, camera, image, np.array(ghost.color))
-            image = np.rint((1 - _GHOST_OPACITY) * image + _GHOST_OPACITY * with_ghost).astype(np.uint8)
+            image = np.rint((1 - _GHOST_OPACITY) * image + _GHOST_OPACITY * with_ghost).astype(
+                np.uint8
+            )
         image = _draw_arm(solids, nodes, camera, image)
         yield _finish(image, camera, description, nodes if frames else None, points)
 
@@ -199,11 +220,17 @@ def _triangles(part: Part) -> Array:
             mesh = trimesh.creation.uv_sphere(1.0, count=[_ROUND_SIDES // 2, _ROUND_SIDES])
             scale = float(shape.radius)
         case Cylinder():
-            scale = float(shape.radius)  # of unit size, since trimesh merges points nearer than 1e-8
-            mesh = trimesh.creation.cylinder(1.0, float(shape.length) / scale, sections=_ROUND_SIDES)
+            scale = float(
+                shape.radius
+            )  # of unit size, since trimesh merges points nearer than 1e-8
+            mesh = trimesh.creation.cylinder(
+                1.0, float(shape.length) / scale, sections=_ROUND_SIDES
+            )
         case Capsule():
             scale = float(shape.radius)
-            mesh = trimesh.creation.capsule(float(shape.length) / scale, 1.0, count=[_ROUND_SIDES, _ROUND_SIDES // 2])
+            mesh = trimesh.creation.capsule(
+                float(shape.length) / scale, 1.0, count=[_ROUND_SIDES, _ROUND_SIDES // 2]
+            )
             mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
     if not isinstance(shape, Mesh):
         corners = scale * np.asarray(mesh.triangles, dtype=float)
@@ -225,7 +252,10 @@ def _extent(
         low = solid.corners.min(axis=(0, 1))
         high = solid.corners.max(axis=(0, 1))
         box = np.array(list(product(*zip(low, high, strict=True))))
-        nodes = [transforms[:, solid.link], *(ghost.transforms[None, solid.link] for ghost in ghosts)]
+        nodes = [
+            transforms[:, solid.link],
+            *(ghost.transforms[None, solid.link] for ghost in ghosts),
+        ]
         extent += [box @ T[:3, :3].T + T[:3, 3] for T in chain.from_iterable(nodes)]
     if frames:
         length = PICTURE_TRIAD_SHARE * scene_size(description)
@@ -350,7 +380,9 @@ def _rasterize(corners: Array, colors: Array, image: NDArray[np.uint8]) -> NDArr
     return drawn.reshape(image.shape)
 
 
-def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest: Array, size: tuple[int, int]) -> None:
+def _draw_block(
+    corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest: Array, size: tuple[int, int]
+) -> None:
     """Draw triangles, shape (m, 3, 3), over pixels, shape (height * width, 3), and update their largest 1/depth."""
     height, width = size
     # The pixels of each span: those whose centres, at x + 1/2, lie between its ends.
@@ -436,13 +468,22 @@ def _draw_ground(description: Description, camera: _Camera) -> NDArray[np.uint8]
             for k in range(len(pixels) - 1):
                 fade = np.clip(1 - np.hypot(*points[k : k + 2, :2].mean(axis=0)) / half, 0, 1)
                 if fade > 0 and ahead[k] and ahead[k + 1]:
-                    color = tuple(int(g + fade * (line - g)) for g, line in zip(GROUND_COLOR, _GRID_COLOR, strict=True))
-                    draw.line([tuple(pixels[k]), tuple(pixels[k + 1])], fill=color, width=_SUPERSAMPLING)
+                    color = tuple(
+                        int(g + fade * (line - g))
+                        for g, line in zip(GROUND_COLOR, _GRID_COLOR, strict=True)
+                    )
+                    draw.line(
+                        [tuple(pixels[k]), tuple(pixels[k + 1])], fill=color, width=_SUPERSAMPLING
+                    )
     return np.asarray(image)
 
 
 def _finish(
-    image: NDArray[np.uint8], camera: _Camera, description: Description, nodes: Array | None, points: Array
+    image: NDArray[np.uint8],
+    camera: _Camera,
+    description: Description,
+    nodes: Array | None,
+    points: Array,
 ) -> Image:
     """Return the picture of a fine image, with lines and names drawn over it."""
     from PIL import Image, ImageDraw, ImageFont
@@ -466,7 +507,10 @@ def _finish(
         ]
 
     # The fine picture is reduced, and names are written at the size of the small one.
-    small = drawn.resize((camera.size[0] // _SUPERSAMPLING, camera.size[1] // _SUPERSAMPLING), Image.Resampling.LANCZOS)
+    small = drawn.resize(
+        (camera.size[0] // _SUPERSAMPLING, camera.size[1] // _SUPERSAMPLING),
+        Image.Resampling.LANCZOS,
+    )
     draw = ImageDraw.Draw(small)
     font = ImageFont.load_default(max(12, small.height // 36))
     for text, (x, y) in names:

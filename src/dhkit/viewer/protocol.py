@@ -78,7 +78,10 @@ def encode_scene(scene: Scene) -> bytes:
         """Return what meshcat gives for an array as msgpack writes it."""
         return msgpack.ExtType(value.type, value.data)
 
-    blocks = [_json(scene.about), *(msgpack.packb(command, default=packed_array) for command in scene.commands)]
+    blocks = [
+        _json(scene.about),
+        *(msgpack.packb(command, default=packed_array) for command in scene.commands),
+    ]
     body = b"".join(LENGTH.pack(len(block)) + block for block in blocks)
     return _message(MessageType.SCENE, body, joints=len(scene.about["joints"]))
 
@@ -154,7 +157,9 @@ def encode_ghosts(transforms: Array, tints: NDArray[np.uint8]) -> bytes:
         Red, green and blue, shape (k, 3).
     """
     count = LENGTH.pack(len(transforms))
-    return _message(MessageType.GHOSTS, count, transforms[:, :, :3], tints, joints=transforms.shape[1] - 2)
+    return _message(
+        MessageType.GHOSTS, count, transforms[:, :, :3], tints, joints=transforms.shape[1] - 2
+    )
 
 
 def encode_obstacles(transforms: Array, half_edges: Array, radii: Array) -> bytes:
@@ -171,7 +176,9 @@ def encode_obstacles(transforms: Array, half_edges: Array, radii: Array) -> byte
     radii
         Radii, shape (k,), m.
     """
-    rows = np.concatenate([transforms[:, :3, :].reshape(-1, 12), half_edges, radii[:, None]], axis=1)
+    rows = np.concatenate(
+        [transforms[:, :3, :].reshape(-1, 12), half_edges, radii[:, None]], axis=1
+    )
     return _message(MessageType.OBSTACLES, LENGTH.pack(len(rows)), rows)
 
 
@@ -209,7 +216,9 @@ class Samples:
         if later.restart or later.columns != self.columns:
             return replace(later, restart=True)
         rows = np.concatenate([self.rows, later.rows])
-        return replace(self, rows=rows[-max(1, BOUNDS.sample_numbers // max(1, len(self.columns))) :])
+        return replace(
+            self, rows=rows[-max(1, BOUNDS.sample_numbers // max(1, len(self.columns))) :]
+        )
 
     def encoded(self) -> bytes:
         """Return the samples as a message."""
@@ -224,7 +233,11 @@ def stamped(message: bytes, sequence: int) -> bytes:
 
 
 def _message(
-    kind: MessageType, *parts: bytes | NDArray[Any], flags: int = 0, joints: int = 0, time: float = 0.0
+    kind: MessageType,
+    *parts: bytes | NDArray[Any],
+    flags: int = 0,
+    joints: int = 0,
+    time: float = 0.0,
 ) -> bytes:
     """Return a message with sequence 0; arrays become floats of four bytes, except those of bytes."""
     arrays = (part if isinstance(part, bytes) else _bytes(part) for part in parts)

@@ -61,7 +61,9 @@ def decode_message(text: str | bytes) -> Shown | Request:
 def _integer(message: dict[str, object], name: str, least: int) -> int:
     value = message.get(name)
     if type(value) is not int or not least <= value < MAX_SEQUENCE:
-        raise ProtocolError(f"{name} is {str(value)[:40]}; expected a whole number from {least} to 2^32 - 1")
+        raise ProtocolError(
+            f"{name} is {str(value)[:40]}; expected a whole number from {least} to 2^32 - 1"
+        )
     return value
 
 

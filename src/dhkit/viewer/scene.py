@@ -94,11 +94,18 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
     commands += [_set_transform(path, T) for path, T in zip(nodes, transforms, strict=True)]
     about = {
         "name": description.name,
-        "joints": [{"name": j.name, "unit": "deg" if j.is_revolute else "m"} for j in description.joints],
-        "labels": [{"frame": label.frame, "text": label.text} for label in _labels(description, places)],
+        "joints": [
+            {"name": j.name, "unit": "deg" if j.is_revolute else "m"} for j in description.joints
+        ],
+        "labels": [
+            {"frame": label.frame, "text": label.text} for label in _labels(description, places)
+        ],
         "size": size,
         "up": _upward(description),
-        "nodes": [c["path"].removeprefix(f"{_ROOT}/") if c["type"] == "set_object" else "" for c in commands],
+        "nodes": [
+            c["path"].removeprefix(f"{_ROOT}/") if c["type"] == "set_object" else ""
+            for c in commands
+        ],
     }
     return Scene(about, tuple(commands))
 
@@ -164,11 +171,16 @@ def _shared_origins(description: Description) -> list[list[list[int]]]:
     near = _COINCIDENCE * scene_size(description)
     places: list[list[list[int]]] = []
     for i in range(description.n + 2):
-        place = next((p for p in places if np.abs(T[:, p[0][0], :3, 3] - T[:, i, :3, 3]).max() < near), None)
+        place = next(
+            (p for p in places if np.abs(T[:, p[0][0], :3, 3] - T[:, i, :3, 3]).max() < near), None
+        )
         if place is None:
             places.append([[i]])
             continue
-        same = next((s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < _COINCIDENCE), None)
+        same = next(
+            (s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < _COINCIDENCE),
+            None,
+        )
         if same is None:
             place.append([i])
         else:
@@ -194,14 +206,21 @@ def _part_commands(parts: Sequence[Part]) -> Iterator[Lowered]:
         yield _set_transform(path, part_transform(part))
 
 
-def _triad_commands(description: Description, places: list[list[list[int]]], size: float) -> Iterator[Lowered]:
+def _triad_commands(
+    description: Description, places: list[list[list[int]]], size: float
+) -> Iterator[Lowered]:
     for place in places:
         for k, same in enumerate(place):
             name = _frame_name(description, same[0])
             node = "tool" if name == "tool" else f"link{name}"
             triad = triad_object(_TRIAD_SHARE * size * _NESTED_RATIO**k, f"{node}/frame")
             yield _set_object(f"{_ROOT}/{node}/frame", triad)
-            yield {"type": "set_property", "path": f"{_ROOT}/{node}/frame", "property": "visible", "value": False}
+            yield {
+                "type": "set_property",
+                "path": f"{_ROOT}/{node}/frame",
+                "property": "visible",
+                "value": False,
+            }
 
 
 def _upward(description: Description) -> list[float]:

@@ -74,7 +74,9 @@ class _BoundedServer(HTTPServer):
                 return
         self._open += 1
         self._strangers[stream] = None
-        asyncio.get_running_loop().call_later(FIRST_REQUEST_TIMEOUT, self._close_if_stranger, stream)
+        asyncio.get_running_loop().call_later(
+            FIRST_REQUEST_TIMEOUT, self._close_if_stranger, stream
+        )
         super().handle_stream(stream, address)
 
     def trust(self, stream: IOStream) -> None:
@@ -117,7 +119,11 @@ class ViewerServer:
     """
 
     def __init__(
-        self, state: Mapping[Slot, bytes], answer: Answer | None = None, port: int = 0, token: str | None = None
+        self,
+        state: Mapping[Slot, bytes],
+        answer: Answer | None = None,
+        port: int = 0,
+        token: str | None = None,
     ) -> None:
         self.token = token or secrets.token_urlsafe(16)
         self._answer = answer
@@ -206,9 +212,17 @@ class ViewerServer:
         """
         self._call_soon(lambda: None)
         deadline = time.monotonic() + timeout
-        while not self.pages or self._changed or not all(page.session.settled for page in tuple(self.pages)):
+        while (
+            not self.pages
+            or self._changed
+            or not all(page.session.settled for page in tuple(self.pages))
+        ):
             if time.monotonic() > deadline:
-                problem = "no page is connected" if not self.pages else "a page has not drawn the latest state"
+                problem = (
+                    "no page is connected"
+                    if not self.pages
+                    else "a page has not drawn the latest state"
+                )
                 raise TimeoutError(f"{problem} after {timeout:g} s; it is at {self.url}")
             if not self._thread.is_alive():
                 raise ModelError("the viewer's server has ended")
@@ -246,7 +260,10 @@ class ViewerServer:
                 self._changed.pop(other, None)
         if isinstance(message, Samples):
             _, earlier = self._state.get(slot, (0, None))
-            self._state[slot] = (self._sequence, _join(earlier, replace(message, restart=earlier is None)))
+            self._state[slot] = (
+                self._sequence,
+                _join(earlier, replace(message, restart=earlier is None)),
+            )
             self._changed[slot] = _join(self._changed.get(slot), message)
             return
         self._state[slot] = (self._sequence, stamped(message, self._sequence))
@@ -276,7 +293,9 @@ class ViewerServer:
 
     def _flush(self) -> None:
         with self._lock:
-            latest = {slot: (self._state[slot][0], message) for slot, message in self._changed.items()}
+            latest = {
+                slot: (self._state[slot][0], message) for slot, message in self._changed.items()
+            }
             self._changed.clear()
         for page in tuple(self.pages):
             for slot, (sequence, message) in latest.items():
@@ -285,12 +304,16 @@ class ViewerServer:
 
     def _start(self) -> int:
         started: Future[int] = Future()
-        self._thread = threading.Thread(target=self._run, args=(started,), name="dhkit-viewer", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(started,), name="dhkit-viewer", daemon=True
+        )
         self._thread.start()
         try:
             return started.result(_START_TIMEOUT)
         except (OSError, FutureTimeout) as error:
-            raise ModelError(f"the viewer's server did not start on {_ADDRESS}: {str(error) or 'no answer'}") from None
+            raise ModelError(
+                f"the viewer's server did not start on {_ADDRESS}: {str(error) or 'no answer'}"
+            ) from None
 
     def _run(self, started: Future[int]) -> None:
         try:
@@ -304,12 +327,17 @@ class ViewerServer:
     async def _serve(self, started: Future[int]) -> None:
         self._loop = asyncio.get_running_loop()
         self._stop = asyncio.Event()
-        routes = [(r"/([^/]*)/socket", Page, {"server": self}), (r"/([^/]*)/(.*)", File, {"server": self})]
+        routes = [
+            (r"/([^/]*)/socket", Page, {"server": self}),
+            (r"/([^/]*)/(.*)", File, {"server": self}),
+        ]
         application = Application(
             routes,
             default_handler_class=Refused,
             default_handler_args={"server": self},
-            log_function=lambda handler: _LOG.debug("%s %s", handler.get_status(), handler.request.method),
+            log_function=lambda handler: _LOG.debug(
+                "%s %s", handler.get_status(), handler.request.method
+            ),
             websocket_ping_interval=_PING_PERIOD,
             websocket_max_message_size=BOUNDS.message_bytes,
         )
@@ -342,7 +370,9 @@ def _answer_text(answer: Answer, request: Request) -> str:
     """Return the answer to a request as JSON, or its error in one line."""
     reply: dict[str, object] = {"id": request.id}
     try:
-        return json.dumps(reply | {"type": "answer", "data": answer(request.name, request.data)}, allow_nan=False)
+        return json.dumps(
+            reply | {"type": "answer", "data": answer(request.name, request.data)}, allow_nan=False
+        )
     except (DhkitError, ValueError, TypeError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
     except Exception as error:

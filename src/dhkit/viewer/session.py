@@ -62,7 +62,9 @@ class Session:
     def __init__(self, state: Mapping[int, tuple[int, bytes | Samples]]) -> None:
         # A new page needs the slots in their order. Later the message that has waited longest is next: poses that come
         # as fast as they are drawn would otherwise leave no turn to anything else.
-        self._waiting = {slot: (slot, sequence, message) for slot, (sequence, message) in state.items()}
+        self._waiting = {
+            slot: (slot, sequence, message) for slot, (sequence, message) in state.items()
+        }
         self._unshown: dict[bool, set[int]] = {False: set(), True: set()}
         """Sequence numbers under way, by whether their slot is a panel's."""
 
@@ -85,7 +87,9 @@ class Session:
     def next(self) -> bytes | None:
         """Return a message to send now; None if enough are under way, or nothing waits."""
         capacity = {False: 1, True: BOUNDS.panel_messages}
-        free_lanes = {lane for lane, unshown in self._unshown.items() if len(unshown) < capacity[lane]}
+        free_lanes = {
+            lane for lane, unshown in self._unshown.items() if len(unshown) < capacity[lane]
+        }
         sendable = [slot for slot in self._waiting if (slot >= Slot.PANELS) in free_lanes]
         if not sendable:
             return None

@@ -79,7 +79,11 @@ def plot_simulation(result: SimulationResult) -> Figure:
     rows = len(kinds) + 1
     figure = new_figure(figsize=(11.5, 1.6 + 2.2 * rows), layout="constrained")
     controller = f"{result.controller}, " if result.controller else ""
-    figure.suptitle(f"{description.name}: {controller}{result.t[-1]:.3g} s simulated", fontsize=13, fontweight="bold")
+    figure.suptitle(
+        f"{description.name}: {controller}{result.t[-1]:.3g} s simulated",
+        fontsize=13,
+        fontweight="bold",
+    )
     grid = figure.subplots(rows, 2, sharex=True, squeeze=False)
     for (values, errors), (joints, unit, label, _) in zip(grid, kinds, strict=False):
         _draw_values(values, result, joints, unit, label)
@@ -115,10 +119,16 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
     first = next(iter(results.values())).description
     for name, result in results.items():
         if result.description.kinds != first.kinds:
-            raise ValueError(f"{name} has joints {result.description.kinds}; expected {first.kinds}")
+            raise ValueError(
+                f"{name} has joints {result.description.kinds}; expected {first.kinds}"
+            )
     layout = ConstrainedLayoutEngine(w_pad=_DIAGRAM_MARGIN)
     figure = new_figure(figsize=(11.5, max(3.8, 1.6 + 0.42 * len(results))), layout=layout)
-    figure.suptitle(title or f"{first.name}: errors of {len(results)} controllers", fontsize=13, fontweight="bold")
+    figure.suptitle(
+        title or f"{first.name}: errors of {len(results)} controllers",
+        fontsize=13,
+        fontweight="bold",
+    )
     curves, bars = figure.subplots(1, 2, width_ratios=(1.5, 1))
     unit = _unit(first, np.arange(first.n))
     _draw_largest_errors(curves, results)
@@ -141,12 +151,18 @@ def _(value: Mapping[str, SimulationResult]) -> Figure:
     return plot_comparison(value)
 
 
-def _draw_values(axes: Axes, result: SimulationResult, joints: NDArray[np.intp], unit: float, label: str) -> None:
+def _draw_values(
+    axes: Axes, result: SimulationResult, joints: NDArray[np.intp], unit: float, label: str
+) -> None:
     numbers = result.description.numbers
     both = unit * np.concatenate([result.q[:, joints], result.reference_q[:, joints]], axis=1)
     rows = _extreme_rows(both)
     diagram = Diagram(
-        label, joints, both[rows, : len(joints)], unit * numbers.lower[joints], unit * numbers.upper[joints]
+        label,
+        joints,
+        both[rows, : len(joints)],
+        unit * numbers.lower[joints],
+        unit * numbers.upper[joints],
     )
     draw_diagram(axes, diagram, result.t[rows])
     low, high = axes.get_ylim()
@@ -164,9 +180,15 @@ def _draw_errors(axes: Axes, result: SimulationResult, joints: NDArray[np.intp])
     rows = _extreme_rows(error)
     unit = f"{prefix}{_unit(result.description, joints)}"
     none = np.full(len(joints), np.inf)
-    draw_curves(axes, Diagram(f"joint error [{unit}]", joints, error[rows] / factor, -none, none), result.t[rows])
+    draw_curves(
+        axes,
+        Diagram(f"joint error [{unit}]", joints, error[rows] / factor, -none, none),
+        result.t[rows],
+    )
     rms = float(result.rms_error[joints].max())
-    _remark(axes, f"largest {np.abs(error).max() / factor:.3g} {unit}, RMS {rms / factor:.3g} {unit}")
+    _remark(
+        axes, f"largest {np.abs(error).max() / factor:.3g} {unit}, RMS {rms / factor:.3g} {unit}"
+    )
 
 
 def _draw_torques(axes: Axes, result: SimulationResult) -> bool:
@@ -205,7 +227,9 @@ def _draw_tool_errors(axes: Axes, result: SimulationResult) -> None:
         side.plot(result.t[rows], error[rows] / factor, color=color, lw=1.8)
         side.set_ylim(0.0, 1.08 * float(error.max()) / factor or 1.0)
         remarks.append(f"{error.max() / factor:.3g} {prefix}{unit}")
-        side.set_ylabel(f"{'position' if unit == 'm' else 'rotation'} [{prefix}{unit}]", color=color)
+        side.set_ylabel(
+            f"{'position' if unit == 'm' else 'rotation'} [{prefix}{unit}]", color=color
+        )
         side.tick_params(axis="y", colors=color)
     style_axes(axes, axes.get_ylabel())
     right.spines[["top"]].set_visible(False)
@@ -220,7 +244,12 @@ def _draw_largest_errors(axes: Axes, results: Mapping[str, SimulationResult]) ->
         rows = _extreme_rows(error[:, None])
         style = LINE_STYLES[k // len(CONTROLLER_COLORS) % len(LINE_STYLES)]
         axes.plot(
-            result.t[rows], error[rows], style, color=CONTROLLER_COLORS[k % len(CONTROLLER_COLORS)], lw=1.6, label=name
+            result.t[rows],
+            error[rows],
+            style,
+            color=CONTROLLER_COLORS[k % len(CONTROLLER_COLORS)],
+            lw=1.6,
+            label=name,
         )
         # A run that begins on its reference would otherwise stretch the scale down to 0.
         least = min(least, float(np.quantile(error, 0.02)))
@@ -238,7 +267,9 @@ def _draw_bars(axes: Axes, results: Mapping[str, SimulationResult]) -> None:
     colors = [CONTROLLER_COLORS[k % len(CONTROLLER_COLORS)] for k in places]
     axes.barh(places, drawn - least, left=least, color=colors, height=0.6)
     for place, value in zip(places, rms, strict=True):
-        axes.text(max(value, _MIN_ERROR) * 1.15, place, f"{value:.1e}", va="center", fontsize=_SMALL_TEXT)
+        axes.text(
+            max(value, _MIN_ERROR) * 1.15, place, f"{value:.1e}", va="center", fontsize=_SMALL_TEXT
+        )
     axes.set_xscale("log")
     axes.set_xlim(least, float(drawn.max()) * (drawn.max() / least) ** 0.25)
     axes.set_yticks(places, list(results))
@@ -280,7 +311,11 @@ def _legend_handles(saturated: bool) -> tuple[Any, ...]:
     limit = limit_handle()
     if not saturated:
         return (reference, limit)
-    return (reference, limit, Line2D([], [], color=SHARED_COLOR, lw=_SATURATED_STYLE["lw"], label="saturated"))
+    return (
+        reference,
+        limit,
+        Line2D([], [], color=SHARED_COLOR, lw=_SATURATED_STYLE["lw"], label="saturated"),
+    )
 
 
 def _remark(axes: Axes, text: str) -> None:
@@ -289,7 +324,10 @@ def _remark(axes: Axes, text: str) -> None:
 
 def _prefix(largest: float) -> tuple[float, str]:
     """Return the factor and the letter of the largest unit in which a number is at least 1, or of the smallest unit."""
-    return next((prefix for prefix in _PREFIXES if largest >= prefix[0]), _PREFIXES[-1 if largest > 0 else 0])
+    return next(
+        (prefix for prefix in _PREFIXES if largest >= prefix[0]),
+        _PREFIXES[-1 if largest > 0 else 0],
+    )
 
 
 def _unit(description: Description, joints: NDArray[np.intp]) -> str:

@@ -52,7 +52,9 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
     samples = _samples(trajectory)
     diagrams = _diagrams(trajectory, samples)
     figure = new_figure(figsize=(11.5, 1.6 + 1.75 * len(diagrams)), layout="constrained")
-    figure.suptitle(f"{description.name}: {trajectory.duration:.3g} s", fontsize=13, fontweight="bold")
+    figure.suptitle(
+        f"{description.name}: {trajectory.duration:.3g} s", fontsize=13, fontweight="bold"
+    )
     grid = figure.add_gridspec(len(diagrams), 3, width_ratios=(1.3, 1, _TICK_MARGIN))
     first = None
     for row, diagram in enumerate(diagrams):
@@ -94,16 +96,22 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
             name = description.joints[int(np.argmin(np.isfinite(limits)))].name
             raise ValueError(f"joint {name} has no {quantity} limit; expected one of each joint")
     figure = new_figure(figsize=(11.5, 1.1 + 2.4 * len(motions)), layout="constrained")
-    figure.suptitle(f"{description.name}: what motions use of the limits", fontsize=13, fontweight="bold")
+    figure.suptitle(
+        f"{description.name}: what motions use of the limits", fontsize=13, fontweight="bold"
+    )
     grid = figure.subplots(len(motions), 2, sharex=True, sharey=True, squeeze=False)
     for row, (name, motion) in zip(grid, motions.items(), strict=True):
         motion.require(description)
         samples = _samples(motion)
-        row[0].set_title(f"{name}: {motion.duration:.3f} s", fontsize=11, fontweight="bold", loc="left")
+        row[0].set_title(
+            f"{name}: {motion.duration:.3f} s", fontsize=11, fontweight="bold", loc="left"
+        )
         shares = {"rate": samples.qd / numbers.velocity, "torque": samples.tau / numbers.effort}
         for axes, (quantity, values) in zip(row, shares.items(), strict=True):
             draw_curves(
-                axes, percent_diagram(f"{quantity} / limit [%]", np.arange(description.n), values), samples.times
+                axes,
+                percent_diagram(f"{quantity} / limit [%]", np.arange(description.n), values),
+                samples.times,
             )
             largest = f"up to {100 * float(np.abs(values).max()):.0f} %"
             axes.set_title(largest, fontsize=10, color=SHARED_COLOR, loc="right")
@@ -129,9 +137,12 @@ def _samples(trajectory: Trajectory) -> Samples:
     times = times[order]
     left = left[order, None]
     q, qd, qdd = (
-        np.where(left, value(times, "left"), value(times)) for value in (trajectory.q, trajectory.qd, trajectory.qdd)
+        np.where(left, value(times, "left"), value(times))
+        for value in (trajectory.q, trajectory.qd, trajectory.qdd)
     )
-    return Samples(trajectory.description, times, q, qd, qdd, trajectory.payload, trajectory.friction)
+    return Samples(
+        trajectory.description, times, q, qd, qdd, trajectory.payload, trajectory.friction
+    )
 
 
 def _diagrams(trajectory: Trajectory, samples: Samples) -> list[Diagram]:
@@ -142,7 +153,11 @@ def _diagrams(trajectory: Trajectory, samples: Samples) -> list[Diagram]:
         for i, unit, label, _ in kinds
     ]
     if len(kinds) > 1 and np.isfinite(numbers.velocity).all():
-        diagrams.append(percent_diagram("rate / limit [%]", np.arange(trajectory.n), samples.qd / numbers.velocity))
+        diagrams.append(
+            percent_diagram(
+                "rate / limit [%]", np.arange(trajectory.n), samples.qd / numbers.velocity
+            )
+        )
     else:
         limits = [unit * numbers.velocity[i] for i, unit, _, _ in kinds]
         diagrams += [

@@ -137,7 +137,9 @@ class View(Exportable):
         """
         q = joint_array(self._description, q)
         if q.ndim != 1:
-            raise ValueError(f"q has shape {q.shape}; expected ({self._description.n},): play shows a motion")
+            raise ValueError(
+                f"q has shape {q.shape}; expected ({self._description.n},): play shows a motion"
+            )
         if not np.isfinite(q).all():
             raise ValueError(f"q is {q.tolist()}; expected finite values")
         self._q = q.copy()
@@ -206,7 +208,9 @@ class View(Exportable):
         if reference_q is not None:
             ghost = node_transforms(self._description, reference_q), ghost_tints(1)
         self._played = motion
-        self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace, ghost=ghost))
+        self._publish(
+            Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace, ghost=ghost)
+        )
 
     def trace(self, points: ArrayLike | None) -> None:
         """Draw a line through points, instead of the last; None takes it away.
@@ -259,10 +263,17 @@ class View(Exportable):
             An infinite half axis, or a scale that is not positive.
         """
         longest = _ELLIPSOID_SHARE * scene_size(self._description)
-        transforms = np.zeros((0, 4, 4)) if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
+        transforms = (
+            np.zeros((0, 4, 4)) if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
+        )
         self._publish(Slot.ELLIPSOIDS, protocol.encode_ellipsoids(transforms))
 
-    def ghosts(self, q: ArrayLike | None, tints: ArrayLike | None = None, names: Sequence[str] | None = None) -> None:
+    def ghosts(
+        self,
+        q: ArrayLike | None,
+        tints: ArrayLike | None = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
         """Draw translucent copies of the arm in further states, instead of the last; None takes them away.
 
         Parameters
@@ -280,11 +291,15 @@ class View(Exportable):
         ValueError
             Other shapes, another number of names, or colors below 0 or above 1.
         """
-        states = np.zeros((0, self._description.n)) if q is None else joint_array(self._description, q)
+        states = (
+            np.zeros((0, self._description.n)) if q is None else joint_array(self._description, q)
+        )
         states = states[None] if isinstance(q, str) else states
         if states.ndim != 2:
             raise ValueError(f"q has shape {states.shape}; expected (k, {self._description.n})")
-        colors = ghost_tints(len(states)) if tints is None else color_bytes(tints, len(states), "tints")
+        colors = (
+            ghost_tints(len(states)) if tints is None else color_bytes(tints, len(states), "tints")
+        )
         if names is not None and len(names) != len(states):
             raise ValueError(f"{len(names)} names; expected {len(states)}, one a ghost")
         shown = np.atleast_1d(np.isfinite(states).all(axis=1))
@@ -294,7 +309,10 @@ class View(Exportable):
             if is_shown
         )
         transforms = node_transforms(self._description, states[shown])
-        self._ghosts = tuple(Ghost(T, tuple(tint)) for T, tint in zip(transforms, colors[shown].tolist(), strict=True))
+        self._ghosts = tuple(
+            Ghost(T, tuple(tint))
+            for T, tint in zip(transforms, colors[shown].tolist(), strict=True)
+        )
         self._publish(Slot.GHOSTS, protocol.encode_ghosts(transforms, colors[shown]))
 
     def obstacles(self, obstacles: Scene | None) -> None:
@@ -349,7 +367,9 @@ class View(Exportable):
         """Show the present state as a page of its own."""
         return framed_page(self.html(interactive=True), self._description.name)
 
-    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, Any] | Any:
+    def _repr_mimebundle_(
+        self, include: object = None, exclude: object = None
+    ) -> dict[str, Any] | Any:
         """Show the page in a notebook, such that it follows :meth:`show` where anywidget is installed."""
         page = self.html(interactive=True)
         with self._lock:
@@ -359,7 +379,10 @@ class View(Exportable):
                 self._widget.page = page
             widget = self._widget
         if widget is None:
-            return {"text/html": framed_page(page, self._description.name), "text/plain": repr(self)}
+            return {
+                "text/html": framed_page(page, self._description.name),
+                "text/plain": repr(self),
+            }
         return widget._repr_mimebundle_(include=include, exclude=exclude)
 
     def __repr__(self) -> str:

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, joint_vector, takes_robot, world_to_frames, world_to_tool
+from dhkit.description import (
+    Array,
+    Description,
+    joint_vector,
+    takes_robot,
+    world_to_frames,
+    world_to_tool,
+)
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import Workspace, first_axis
@@ -89,7 +96,9 @@ class _Pixels:
         """Draw the pixels and the border of the reached set; return the image."""
         x, y = (self.corner[k] + self.edge * np.arange(self.best.shape[k] + 1) for k in range(2))
         pixels = np.ma.masked_invalid(self.best).T
-        image = axes.pcolormesh(x, y, pixels, cmap=_COLORMAP, vmin=0, vmax=most or 1.0, rasterized=True)
+        image = axes.pcolormesh(
+            x, y, pixels, cmap=_COLORMAP, vmin=0, vmax=most or 1.0, rasterized=True
+        )
         centres = x[:-1] + self.edge / 2, y[:-1] + self.edge / 2
         reached = np.isfinite(self.best).astype(float).T
         axes.contour(*centres, reached, levels=[0.5], colors=LINK_COLOR, linewidths=1.2)
@@ -114,12 +123,20 @@ def plot_workspace(workspace: Workspace) -> Figure:
     line = _arm_in_pieces(description, first_configuration(description))
     best = world_to_tool(description, workspace.best)[:3, 3]
     borders = boundaries(description)
-    drawn = [np.vstack([reach.plane.flatten(line), *map(reach.plane.border, borders)]) for reach in reaches]
-    widths, heights = np.transpose([reach.shape(points) for reach, points in zip(reaches, drawn, strict=True)])
+    drawn = [
+        np.vstack([reach.plane.flatten(line), *map(reach.plane.border, borders)])
+        for reach in reaches
+    ]
+    widths, heights = np.transpose(
+        [reach.shape(points) for reach, points in zip(reaches, drawn, strict=True)]
+    )
     scale = min(_MAX_SIZE[0] / widths.sum(), _MAX_SIZE[1] / heights.max())
     columns = scale * widths + _TICK_MARGIN
     rows = (len(borders) + 1) // 2
-    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + _LEGEND_ROW_HEIGHT * rows
+    size = (
+        max(columns.sum() + 1.0, 6.4),
+        max(scale * heights.max(), 1.5) + 1.6 + _LEGEND_ROW_HEIGHT * rows,
+    )
     figure = new_figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
     for ax, reach in zip(axes, reaches, strict=True):
@@ -162,19 +179,32 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
     axes = space_axes(figure, 111)
     line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
-    axes.plot(*line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85)
-    surface = _surface(ellipsoid, _ELLIPSOID_SHARE * scene_size(description) / longest if longest else 1.0)
+    axes.plot(
+        *line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85
+    )
+    surface = _surface(
+        ellipsoid, _ELLIPSOID_SHARE * scene_size(description) / longest if longest else 1.0
+    )
     _draw_surface(axes, surface)
     set_space_limits(
-        axes, np.concatenate([line, surface.reshape(-1, 3)]), margin=_SPACE_MARGIN * scene_size(description)
+        axes,
+        np.concatenate([line, surface.reshape(-1, 3)]),
+        margin=_SPACE_MARGIN * scene_size(description),
     )
-    axes.set_title(f"{description.name}: velocity ellipsoid, longest half axis {longest:.3g} m/s", fontsize=12)
+    axes.set_title(
+        f"{description.name}: velocity ellipsoid, longest half axis {longest:.3g} m/s", fontsize=12
+    )
     return figure
 
 
 @plot.register(Ellipsoid)
 def _(value: Ellipsoid) -> Figure:
-    batch = zip(value.center.reshape(-1, 3), value.axes.reshape(-1, 3, 3), value.lengths.reshape(-1, 3), strict=True)
+    batch = zip(
+        value.center.reshape(-1, 3),
+        value.axes.reshape(-1, 3, 3),
+        value.lengths.reshape(-1, 3),
+        strict=True,
+    )
     surfaces = [_surface(Ellipsoid(*parts), 1.0) for parts in batch]
     surfaces = [surface for surface in surfaces if np.isfinite(surface).all()]
     if not surfaces:
@@ -217,7 +247,10 @@ def _planes(workspace: Workspace) -> list[_Plane]:
 
 def _in_plane(axes: Array) -> _Plane:
     """Return the view of a plane; its axes are named where they are the world's."""
-    names = [f"{'xyz'[int(np.argmax(axis))]} [m]" if axis.max() == 1 else "along the plane [m]" for axis in axes]
+    names = [
+        f"{'xyz'[int(np.argmax(axis))]} [m]" if axis.max() == 1 else "along the plane [m]"
+        for axis in axes
+    ]
     return _Plane("", (names[0], names[1]), lambda points: points @ axes.T)
 
 
@@ -236,7 +269,9 @@ def _reach(plane: _Plane, workspace: Workspace) -> _Pixels:
     np.maximum.at(best, tuple(((places - corner) / edge).astype(int).T), workspace.manipulability)
     # A single pixel has too few samples for the best of them to be smooth, and some have none.
     reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=_PIXEL_MARGIN - 1)
-    return _Pixels(plane, corner, edge, np.where(reached, maximum_filter(best, 2 * _PIXEL_MARGIN - 1), np.nan))
+    return _Pixels(
+        plane, corner, edge, np.where(reached, maximum_filter(best, 2 * _PIXEL_MARGIN - 1), np.nan)
+    )
 
 
 def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
@@ -269,12 +304,18 @@ def _title(workspace: Workspace) -> str:
 
 def _surface(ellipsoid: Ellipsoid, scale: float) -> Array:
     """Return an ellipsoid's mesh, shape (_MESH_LINES, _MESH_LINES, 3), m."""
-    turn, height = np.meshgrid(np.linspace(0, math.tau, _MESH_LINES), np.linspace(0, np.pi, _MESH_LINES))
-    sphere = np.stack([np.cos(turn) * np.sin(height), np.sin(turn) * np.sin(height), np.cos(height)], axis=-1)
+    turn, height = np.meshgrid(
+        np.linspace(0, math.tau, _MESH_LINES), np.linspace(0, np.pi, _MESH_LINES)
+    )
+    sphere = np.stack(
+        [np.cos(turn) * np.sin(height), np.sin(turn) * np.sin(height), np.cos(height)], axis=-1
+    )
     return np.asarray(ellipsoid.center + scale * (sphere * ellipsoid.lengths) @ ellipsoid.axes.T)
 
 
 def _draw_surface(axes: Any, surface: Array) -> None:
     x, y, z = np.moveaxis(surface, -1, 0)
-    axes.plot_surface(x, y, z, color=_ELLIPSOID_COLOR, alpha=0.25, linewidth=0, rstride=1, cstride=1, shade=False)
+    axes.plot_surface(
+        x, y, z, color=_ELLIPSOID_COLOR, alpha=0.25, linewidth=0, rstride=1, cstride=1, shade=False
+    )
     axes.plot_wireframe(x, y, z, color=_ELLIPSOID_COLOR, linewidth=0.5, rstride=4, cstride=4)

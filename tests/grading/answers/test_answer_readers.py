@@ -34,14 +34,23 @@ def test_runs_of_tokens_are_replaced_once():
 
     def read_run(k):
         return (
-            ([Token("name", "c", tokens[k].at)], k + 2) if [t.text for t in tokens[k : k + 2]] == ["a", "b"] else None
+            ([Token("name", "c", tokens[k].at)], k + 2)
+            if [t.text for t in tokens[k : k + 2]] == ["a", "b"]
+            else None
         )
 
     assert [t.text for t in replace_runs(tokens, read_run)] == ["c", "c", "a"]
 
 
 @pytest.mark.parametrize(
-    ("text", "index"), [("q[0]", (0,)), ("M[0, 1]", (0, 1)), ("M[..., 2, 3]", (2, 3)), ("q[k]", None), ("q[-1]", None)]
+    ("text", "index"),
+    [
+        ("q[0]", (0,)),
+        ("M[0, 1]", (0, 1)),
+        ("M[..., 2, 3]", (2, 3)),
+        ("q[k]", None),
+        ("q[-1]", None),
+    ],
 )
 def test_python_indices_count_from_zero(text, index):
     assert constant_index(ast.parse(text, mode="eval").body.slice) == index
@@ -76,7 +85,11 @@ def test_names_that_a_matlab_statement_may_assign(text, names):
 
 def test_lines_of_a_notebook_belong_to_cells():
     notebook = Notebook("a\nb\nc", ".py", (1, 3), ())
-    assert [notebook.line_name(line) for line in (1, 2, 3)] == ["cell 1, line 1", "cell 1, line 2", "cell 2, line 1"]
+    assert [notebook.line_name(line) for line in (1, 2, 3)] == [
+        "cell 1, line 1",
+        "cell 1, line 2",
+        "cell 2, line 1",
+    ]
 
 
 def test_entries_with_digits_in_two_readings():
@@ -89,7 +102,10 @@ def test_entries_with_digits_in_two_readings():
 def test_rows_of_displays_and_of_matrices():
     rows = list(rows_of(r"\begin{align} a &= b \\ &+ c \end{align}", 5))
     assert [" ".join(row.text.split()) for row in rows if row.text.strip()] == ["a = b", "+ c"]
-    assert matrix_rows(r"\begin{bmatrix} a & {b & c} \\ d & e \end{bmatrix}") == [["a", "{b & c}"], ["d", "e"]]
+    assert matrix_rows(r"\begin{bmatrix} a & {b & c} \\ d & e \end{bmatrix}") == [
+        ["a", "{b & c}"],
+        ["d", "e"],
+    ]
     assert matrix_rows("a + b") is None
 
 
@@ -136,7 +152,9 @@ def given_texts(name, shape, answers):
     """Return the texts of a quantity's entries by their indices; None where one was not handed in."""
     names = QuantityNames(PLANAR)
     gathered = with_entries_gathered(answers, names)
-    given = given_quantity(name, gathered[name], shape, vocabulary_of(PLANAR, AnswerSheet(answers=answers)), names)
+    given = given_quantity(
+        name, gathered[name], shape, vocabulary_of(PLANAR, AnswerSheet(answers=answers)), names
+    )
     return {entry.index: None if entry.is_missing else entry.text for entry in given}
 
 

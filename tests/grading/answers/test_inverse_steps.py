@@ -23,8 +23,14 @@ def judged(steps):
         ("x", r"answer.ik.steps: found 'x'; expected 1 to 64 steps such as"),
         ([], "answer.ik.steps: found"),
         ([3], r"answer.ik.steps\[0\]: found 3; expected"),
-        ([{"joint": "1", "equation": "a = b"}], r"answer.ik.steps\[0\].joint: found '1'; expected the joint's number"),
-        ([{"joint": 1}], r"answer.ik.steps\[0\]: found a table; expected an equation, a solution, or both"),
+        (
+            [{"joint": "1", "equation": "a = b"}],
+            r"answer.ik.steps\[0\].joint: found '1'; expected the joint's number",
+        ),
+        (
+            [{"joint": 1}],
+            r"answer.ik.steps\[0\]: found a table; expected an equation, a solution, or both",
+        ),
         (
             [{"joint": 1, "equations": "a = b"}],
             r"unknown key answer.ik.steps\[0\].'equations'; did you mean 'equation'",
@@ -36,7 +42,9 @@ def test_sheets_that_cannot_be_read(steps, message):
     with pytest.raises(AnswerError, match=message):
         judged(steps)
     with pytest.raises(AnswerError, match="both branches and steps"):
-        sheet_of({"answer": {"ik": {"branches": [["0"]], "steps": [{"joint": 1, "solution": "0"}]}}})
+        sheet_of(
+            {"answer": {"ik": {"branches": [["0"]], "steps": [{"joint": 1, "solution": "0"}]}}}
+        )
 
 
 @pytest.mark.parametrize(
@@ -44,9 +52,18 @@ def test_sheets_that_cannot_be_read(steps, message):
     [
         ({"equation": "px*s1"}, "no equals sign between two sides; expected an equation"),
         ({"equation": "px = "}, "no equals sign between two sides; expected an equation"),
-        ({"equation": "banana = s1"}, "'banana = s1': defines quantities, and has no equation or solution of q1"),
-        ({"equation": "D = ±px"}, "'D = ±px': defines quantities, and has no equation or solution of q1"),
-        ({"equation": "2*D = px"}, "unknown name 'D' .* a quantity of your own is defined by an equation, D = "),
+        (
+            {"equation": "banana = s1"},
+            "'banana = s1': defines quantities, and has no equation or solution of q1",
+        ),
+        (
+            {"equation": "D = ±px"},
+            "'D = ±px': defines quantities, and has no equation or solution of q1",
+        ),
+        (
+            {"equation": "2*D = px"},
+            "unknown name 'D' .* a quantity of your own is defined by an equation, D = ",
+        ),
         ({"solution": "q2 = px"}, "'q2' stands in front of a solution of q1"),
         ({"solution": "phi = px"}, "'phi' stands in front of a solution of q1"),
         ({"solution": "py +-sqrt(px)"}, r"'\+-' may be ± or a minus; write ±"),
@@ -57,7 +74,9 @@ def test_sheets_that_cannot_be_read(steps, message):
 )
 def test_formulas_that_cannot_be_read_say_why(formulas, message):
     entry = judged([{"joint": 1, **formulas}]).entries[0]
-    assert entry.verdict is Verdict.UNREADABLE and re.search(message, entry.statement), entry.statement
+    assert entry.verdict is Verdict.UNREADABLE and re.search(message, entry.statement), (
+        entry.statement
+    )
 
 
 # Notations of textbooks
@@ -86,7 +105,10 @@ def planar(second, first=None):
         (["r = sqrt(px^2 + py^2)", "alpha = acos((l1^2 + l2^2 - r^2)/(2*l1*l2))"], "pi - alpha"),
         (["phi1 = px^2 + py^2", "phi2 = (phi1 - l1^2 - l2^2)/(2*l1*l2)"], "±acos(phi2)"),
         ([f"cos(phi) = {COSINE}"], "±phi"),
-        ([r"D = \frac{p_x^2 + p_y^2 - l_1^2 - l_2^2}{2 l_1 l_2}"], r"\theta_2 = \mathrm{atan2}(\pm\sqrt{1-D^2}, D)"),
+        (
+            [r"D = \frac{p_x^2 + p_y^2 - l_1^2 - l_2^2}{2 l_1 l_2}"],
+            r"\theta_2 = \mathrm{atan2}(\pm\sqrt{1-D^2}, D)",
+        ),
     ],
 )
 def test_cosines_and_own_letters_are_those_of_the_equations(equation, solution):
@@ -113,11 +135,27 @@ def test_and_wrong_ones_are_wrong(equation, solution):
     ("equation", "solution", "verdict"),
     [
         (["k1 = l1 + l2*c2", "k2 = l2*s2"], "atan2(py, px) - atan2(k2, k1)", Verdict.CORRECT),
-        (["beta = atan2(py, px)", "gamma = atan2(l2*s2, l1 + l2*c2)"], "beta - gamma", Verdict.CORRECT),
-        (["tan(beta) = py/px", "gamma = atan2(l2*s2, l1 + l2*c2)"], "beta - gamma", Verdict.CORRECT),
+        (
+            ["beta = atan2(py, px)", "gamma = atan2(l2*s2, l1 + l2*c2)"],
+            "beta - gamma",
+            Verdict.CORRECT,
+        ),
+        (
+            ["tan(beta) = py/px", "gamma = atan2(l2*s2, l1 + l2*c2)"],
+            "beta - gamma",
+            Verdict.CORRECT,
+        ),
         # The signs belong to those of joint 2.
-        (["r^2 = px^2 + py^2", "cos(psi) = (r^2 + l1^2 - l2^2)/(2*l1*r)"], "atan2(py, px) ∓ psi", Verdict.CORRECT),
-        (["r^2 = px^2 + py^2", "cos(psi) = (r^2 + l1^2 - l2^2)/(2*l1*r)"], "atan2(py, px) ± psi", Verdict.WRONG),
+        (
+            ["r^2 = px^2 + py^2", "cos(psi) = (r^2 + l1^2 - l2^2)/(2*l1*r)"],
+            "atan2(py, px) ∓ psi",
+            Verdict.CORRECT,
+        ),
+        (
+            ["r^2 = px^2 + py^2", "cos(psi) = (r^2 + l1^2 - l2^2)/(2*l1*r)"],
+            "atan2(py, px) ± psi",
+            Verdict.WRONG,
+        ),
     ],
 )
 def test_angles_of_triangles(equation, solution, verdict):
@@ -130,7 +168,10 @@ def test_a_name_with_two_signs_holds_for_its_step():
         {"equation": [f"D = {COSINE}", "S = ±sqrt(1 - D^2)"], "solution": "atan2(S, D)"},
         {"solution": "atan2(py, px) - atan2(l2*S, l1 + l2*D)"},
     )
-    assert "it has two signs; write the sine or cosine of q2 in its place" in report.entries[1].statement
+    assert (
+        "it has two signs; write the sine or cosine of q2 in its place"
+        in report.entries[1].statement
+    )
 
 
 @pytest.mark.slow
@@ -165,6 +206,9 @@ def test_how_branches_were_read_is_shown():
 def test_a_step_may_define_the_letters_of_an_earlier_one_anew():
     report = planar(
         {"equation": [f"D = {COSINE}", "S = ±sqrt(1 - D^2)"], "solution": "atan2(S, D)"},
-        {"equation": ["S = l2*sin(q2)", "D = l1 + l2*cos(q2)"], "solution": "atan2(py, px) - atan2(S, D)"},
+        {
+            "equation": ["S = l2*sin(q2)", "D = l1 + l2*cos(q2)"],
+            "solution": "atan2(py, px) - atan2(S, D)",
+        },
     )
     assert report.verdict is Verdict.CORRECT, str(report)

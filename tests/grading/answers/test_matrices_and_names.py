@@ -32,7 +32,13 @@ TRANSPOSED = [
     "transpose(Matrix({}))",
     "{}^T",
 ]
-TWICE = ["transpose({})'", "sp.Matrix({}).T.T", "({}')'", "transpose(transpose({}))", "Matrix(np.array({}))"]
+TWICE = [
+    "transpose({})'",
+    "sp.Matrix({}).T.T",
+    "({}')'",
+    "transpose(transpose({}))",
+    "Matrix(np.array({}))",
+]
 
 
 def in_one_text(rows, notation):
@@ -44,8 +50,15 @@ def in_one_text(rows, notation):
 @pytest.mark.parametrize("notation", ["lists", "MATLAB"])
 @pytest.mark.parametrize("written", TRANSPOSED + TWICE)
 def test_transposes_are_read(written, notation):
-    right, turned = in_one_text(C_ROWS, notation), in_one_text(list(zip(*C_ROWS, strict=True)), notation)
-    expected = (Verdict.WRONG, Verdict.CORRECT) if written in TRANSPOSED else (Verdict.CORRECT, Verdict.WRONG)
+    right, turned = (
+        in_one_text(C_ROWS, notation),
+        in_one_text(list(zip(*C_ROWS, strict=True)), notation),
+    )
+    expected = (
+        (Verdict.WRONG, Verdict.CORRECT)
+        if written in TRANSPOSED
+        else (Verdict.CORRECT, Verdict.WRONG)
+    )
     assert (verdict(C=written.format(right)), verdict(C=written.format(turned))) == expected
 
 
@@ -177,7 +190,10 @@ LENGTHS = [casadi.SX.sym(name) for name in ("m1", "m2", "l1", "l2")]
 
 @pytest.mark.parametrize("name", ["q2", "q_2"])
 def test_symbols_of_casadi_count_from_one(name):
-    assert ARM.grade(M=mass_matrix(casadi.SX.sym(name), *LENGTHS), explain=False).verdict is Verdict.CORRECT
+    assert (
+        ARM.grade(M=mass_matrix(casadi.SX.sym(name), *LENGTHS), explain=False).verdict
+        is Verdict.CORRECT
+    )
 
 
 def test_entries_of_a_vector_of_casadi_count_from_zero_if_the_answer_shows_it():
@@ -200,7 +216,9 @@ def test_a_list_of_scalars_of_casadi_is_one_answer():
     first, second = casadi.vertsplit(casadi.vertcat(q1, q2 + casadi.sin(q1)))
     assert ARM.grade(g=[first, second], explain=False).verdict is Verdict.WRONG
     m1, m2, l1, l2 = LENGTHS
-    V = casadi.SX.sym("g") * (m1 * l1 / 2 * casadi.sin(q1) + m2 * (l1 * casadi.sin(q1) + l2 / 2 * casadi.sin(q1 + q2)))
+    V = casadi.SX.sym("g") * (
+        m1 * l1 / 2 * casadi.sin(q1) + m2 * (l1 * casadi.sin(q1) + l2 / 2 * casadi.sin(q1 + q2))
+    )
     gradient = casadi.vertsplit(casadi.gradient(V, casadi.vertcat(q1, q2)))
     assert ARM.grade(g=gradient, explain=False).verdict is Verdict.CORRECT
 

@@ -27,7 +27,11 @@ def value_of(text):
 def random_formula(rng, shape, depth):
     """Return a random formula of a shape as nested tuples, and its value."""
     m, n = shape
-    kinds = ["literal"] if depth == 0 else ["literal", "sum", "product", "scaled", "transpose", "quotient"]
+    kinds = (
+        ["literal"]
+        if depth == 0
+        else ["literal", "sum", "product", "scaled", "transpose", "quotient"]
+    )
     match str(rng.choice(kinds)):
         case "sum":
             left, x = random_formula(rng, shape, depth - 1)
@@ -103,7 +107,9 @@ def test_random_formulas_are_read_as_numpy_computes_them(law):
     rng = np.random.default_rng(0)
     notations = ("matlab", "spaces", "numpy", "sympy", "latex")
     for k in range(law.samples(5000, quick=300)):
-        formula, expected = random_formula(rng, tuple(int(x) for x in rng.integers(1, 4, 2)), int(rng.integers(1, 4)))
+        formula, expected = random_formula(
+            rng, tuple(int(x) for x in rng.integers(1, 4, 2)), int(rng.integers(1, 4))
+        )
         text = written(formula, notations[k % len(notations)])
         if not is_algebra(text, vocabulary):
             continue
@@ -122,7 +128,8 @@ def given(name):
     value = getattr(PLANAR.lagrangian, name)
     if isinstance(value, list | tuple) or hasattr(value, "tolist"):
         return [
-            [str(entry) for entry in row] if hasattr(row, "__len__") and name in "MC" else str(row) for row in value
+            [str(entry) for entry in row] if hasattr(row, "__len__") and name in "MC" else str(row)
+            for row in value
         ]
     return str(value)
 
@@ -133,10 +140,27 @@ RIGHT = {
     "quadratic form": {"M": given("M"), "K": "1/2*qd'*M*qd"},
     "its transpose": {"M": given("M"), "K": "transpose(qd)*M*qd/2"},
     "in LaTeX": {"M": given("M"), "K": r"\frac{1}{2}\dot{q}^T M \dot{q}"},
-    "equation of motion": {"M": given("M"), "h": given("h"), "g": given("g"), "tau": "M*qdd + h + G"},
-    "of arguments": {"M": given("M"), "h": given("h"), "g": given("g"), "tau": "M(q)*qdd + h(q, qd) + G(q)"},
-    "entries of vectors": {"h": ["-m2*l1*l2*sin(q(2))*(qd(1)*qd(2) + qd(2)^2/2)", "m2*l1*l2*sin(q(2))*qd(1)^2/2"]},
-    "numpy's entries": {"h": ["-m2*l1*l2*np.sin(q[1])*(qd[0]*qd[1] + qd[1]**2/2)", "m2*l1*l2*np.sin(q[1])*qd[0]**2/2"]},
+    "equation of motion": {
+        "M": given("M"),
+        "h": given("h"),
+        "g": given("g"),
+        "tau": "M*qdd + h + G",
+    },
+    "of arguments": {
+        "M": given("M"),
+        "h": given("h"),
+        "g": given("g"),
+        "tau": "M(q)*qdd + h(q, qd) + G(q)",
+    },
+    "entries of vectors": {
+        "h": ["-m2*l1*l2*sin(q(2))*(qd(1)*qd(2) + qd(2)^2/2)", "m2*l1*l2*sin(q(2))*qd(1)^2/2"]
+    },
+    "numpy's entries": {
+        "h": [
+            "-m2*l1*l2*np.sin(q[1])*(qd[0]*qd[1] + qd[1]**2/2)",
+            "m2*l1*l2*np.sin(q[1])*qd[0]**2/2",
+        ]
+    },
     "with C": {"M": given("M"), "C": given("C"), "g": given("g"), "tau": "M*qdd + C*qd + G"},
     "h of C": {"C": given("C"), "h": "C*qd"},
     "L of energies": {"K": given("K"), "V": given("V"), "L": "K - V"},
@@ -159,9 +183,9 @@ def test_wrong_ones_are_wrong_and_named():
     report = PLANAR.grade({"A1": A1, "A2": A2, "T": "A2*A1"})
     assert report.verdict is Verdict.WRONG and "wrong way" in report.diagnosis[0].sentence
     assert PLANAR.grade({"M": given("M"), "K": "qd'*M*qd"}).entries[-1].verdict is Verdict.WRONG
-    assert PLANAR.grade({"M": given("M"), "C": given("C"), "g": given("g"), "tau": "M*qdd + C*qd - G"}).verdict is (
-        Verdict.WRONG
-    )
+    assert PLANAR.grade(
+        {"M": given("M"), "C": given("C"), "g": given("g"), "tau": "M*qdd + C*qd - G"}
+    ).verdict is (Verdict.WRONG)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +203,10 @@ def test_wrong_ones_are_wrong_and_named():
         ({"M": given("M"), "K": "q'*M*q/2"}, "q' may be the transpose of q or its rate"),
         ({"M": "M*[1 0;0 1]"}, "unknown name 'M'"),
         ({"T": "A1*A2"}, "expected a matrix in brackets, found 'A1"),
-        ({"M": given("M"), "h": given("h"), "g": given("g"), "tau": "M*qdd + h + g"}, "write G for the answer to g"),
+        (
+            {"M": given("M"), "h": given("h"), "g": given("g"), "tau": "M*qdd + h + g"},
+            "write G for the answer to g",
+        ),
         ({"g": "sin([1;2])*[1 2]"}, "sin without an argument"),
         ({"g": "[1 2;3]*[1;2]"}, "rows have different lengths"),
         ({"g": f"{'[1 0;0 1]^8*' * 800}[1;2]"}, "more than 64 products"),
@@ -216,5 +243,7 @@ def test_a_matrix_and_a_number_have_no_sum(text):
     ],
 )
 def test_braces_that_begin_with_a_sign_are_no_factor(g2, verdict):
-    report = dhkit.Arm.load("planar2r").grade({"g": ["(m1/2+m2)*g*l1*c1+m2*g*l2*c12/2", g2]}, explain=False)
+    report = dhkit.Arm.load("planar2r").grade(
+        {"g": ["(m1/2+m2)*g*l1*c1+m2*g*l2*c12/2", g2]}, explain=False
+    )
     assert report.entries[1].verdict is verdict

@@ -66,11 +66,14 @@ NOTATIONS = {
     r"c_{1-2}": cos(V.q1 - V.q2),
     r"\cos\theta_1\,\sin^2\theta_2": cos(V.q1) * sin(V.q2) ** 2,
     r"m_2\left(l_1^2 + l_1 l_2\cos\theta_2\right)": V.m2 * (V.l1**2 + V.l1 * V.l2 * cos(V.q2)),
-    r"\ddot{q}_1 + \ddot{\theta}_{2} + \ddot{\theta_1} + {\dot\theta}_1": 2 * V.qdd1 + V.qdd2 + V.qd1,
+    r"\ddot{q}_1 + \ddot{\theta}_{2} + \ddot{\theta_1} + {\dot\theta}_1": 2 * V.qdd1
+    + V.qdd2
+    + V.qd1,
     r"\dot{\theta}_1\cdot\dot q_2 \times \ell_1": V.qd1 * V.qd2 * V.l1,
     r"$\mathrm{sin}(\theta_1) \, \operatorname{cos}\left(\theta_2\right)$": sin(V.q1) * cos(V.q2),
     r"\sqrt{l_1^2}": V.l1,
-    r"\frac{d}{d t} \theta_{1}{\left(t \right)} + \frac{d^{2}}{d t^{2}} q_{2}{\left(t \right)}": V.qd1 + V.qdd2,
+    r"\frac{d}{d t} \theta_{1}{\left(t \right)} + \frac{d^{2}}{d t^{2}} q_{2}{\left(t \right)}": V.qd1
+    + V.qdd2,
     r"\frac{d\theta_1}{dt}\frac{\partial}{\partial t} q_2(t)": V.qd1 * V.qd2,
     r"\sin{\left(\theta_{1}{\left(t \right)} \right)}": sin(V.q1),
     r"m_{2}gl_{1}": V.m2 * V.g * V.l1,
@@ -96,7 +99,9 @@ def vocabulary():
 
 @pytest.mark.parametrize("text", NOTATIONS)
 def test_a_notation_means_what_is_meant(text, vocabulary):
-    assert doubles(read_answer(text, vocabulary), STATE) == pytest.approx(NOTATIONS[text], rel=1e-14, abs=1e-14)
+    assert doubles(read_answer(text, vocabulary), STATE) == pytest.approx(
+        NOTATIONS[text], rel=1e-14, abs=1e-14
+    )
 
 
 MATRICES = {
@@ -175,7 +180,9 @@ def test_own_names_go_before_the_usual_ones():
 
 
 @pytest.mark.parametrize("name", ["c", "s", "t", "e", "I2x"])
-@pytest.mark.parametrize("written", ["m1*{}**2/3", "m1*{0}*{0}/3", r"\frac{{1}}{{3}} m_1 {}^2", "{}^2*m1/3"])
+@pytest.mark.parametrize(
+    "written", ["m1*{}**2/3", "m1*{0}*{0}/3", r"\frac{{1}}{{3}} m_1 {}^2", "{}^2*m1/3"]
+)
 def test_a_parameter_may_be_called_like_a_shorthand(name, written):
     robot = from_dh([(0, 0, name, 0)], parameters={"m1": 2.0, name: 0.5})
     vocabulary = Vocabulary(robot)
@@ -192,7 +199,10 @@ def test_a_files_parameter_goes_before_shorthand():
 
 def test_sliding_joints_have_no_sine_and_may_be_called_d():
     names = Vocabulary(library_robot("polar_rp"))
-    assert doubles(read_answer("d2 + d2dot + rdd2", names), {"q2": 0.5, "qd2": 0.25, "qdd2": 2.0}) == 2.75
+    assert (
+        doubles(read_answer("d2 + d2dot + rdd2", names), {"q2": 0.5, "qd2": 0.25, "qdd2": 2.0})
+        == 2.75
+    )
     with pytest.raises(AnswerError, match="unknown name"):
         read_answer("c2", names)
 
@@ -210,9 +220,9 @@ def test_absolute_angles_are_sums():
 
 
 WORDS = ("sin", "cos", "q1", "theta", "\\frac", "\\dot", "m1", "l2", "²", "θ", "t", "diff")
-PIECES = st.lists(st.sampled_from([*"()[]{}+-*/^_.,;'&$\\ 0123456789", *WORDS]) | st.text(max_size=4), max_size=24).map(
-    "".join
-)
+PIECES = st.lists(
+    st.sampled_from([*"()[]{}+-*/^_.,;'&$\\ 0123456789", *WORDS]) | st.text(max_size=4), max_size=24
+).map("".join)
 
 
 def fuzz(vocabulary, text):

@@ -50,8 +50,14 @@ def states(names, seed=0, count=STATES, values=None):
 def differing(name, answer, truth, values=None, tolerance=SAME):
     """Return which entries of an answer differ from the truth: M12, g1, K. C by C qd; V and L up to a constant."""
     if name == "C":
-        answer = [("+", *(("*", one, ("s", f"qd{j + 1}")) for j, one in enumerate(row))) for row in trees(answer)]
-        truth = [("+", *(("*", one, ("s", f"qd{j + 1}")) for j, one in enumerate(row))) for row in trees(truth)]
+        answer = [
+            ("+", *(("*", one, ("s", f"qd{j + 1}")) for j, one in enumerate(row)))
+            for row in trees(answer)
+        ]
+        truth = [
+            ("+", *(("*", one, ("s", f"qd{j + 1}")) for j, one in enumerate(row)))
+            for row in trees(truth)
+        ]
     pairs = zip(flat(trees(answer)), flat(trees(truth)), strict=True)
     wrong = []
     with mpmath.workdps(DIGITS):
@@ -61,7 +67,10 @@ def differing(name, answer, truth, values=None, tolerance=SAME):
             found = states(known - {"pi"}, seed=len(label), values=values)
             if name in ("V", "L"):
                 base = found[0]
-                found = [{k: (v if k[0] == "q" else base[k]) for k, v in state.items()} for state in found]
+                found = [
+                    {k: (v if k[0] == "q" else base[k]) for k, v in state.items()}
+                    for state in found
+                ]
             gaps, size = [], mpmath.mpf(0)
             for state in found:
                 a, b = evaluate(mine, state), evaluate(right, state)

@@ -33,7 +33,9 @@ def qdd_(i):
 
 def exact(value):
     """Return a number or a text as an exact expression."""
-    return sp.sympify(value, locals={"I1": sp.Symbol("I1"), "beta": sp.Symbol("beta")}, rational=True)
+    return sp.sympify(
+        value, locals={"I1": sp.Symbol("I1"), "beta": sp.Symbol("beta")}, rational=True
+    )
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,9 @@ class Link:
     viscous: sp.Expr
 
 
-def link(kind, theta=0, d=0, a=0, alpha=0, m=0, com=(0, 0, 0), gear=1, rotor=0, viscous=0, **inertia):
+def link(
+    kind, theta=0, d=0, a=0, alpha=0, m=0, com=(0, 0, 0), gear=1, rotor=0, viscous=0, **inertia
+):
     """Write one row; angles in multiples of pi/2, inertias by key (xx, yy, zz, xz)."""
     I = sp.zeros(3)  # noqa: E741
     for key, value in inertia.items():
@@ -159,7 +163,9 @@ def fourier(expression):
     """Return a sum of sines and cosines of sums of joint variables: products are multiplied out."""
     expression = sp.sympify(expression)
     waves = defaultdict(list)
-    angles = sorted({s for s in expression.free_symbols if s.name[0] == "q" and s.name[1:].isdigit()}, key=str)
+    angles = sorted(
+        {s for s in expression.free_symbols if s.name[0] == "q" and s.name[1:].isdigit()}, key=str
+    )
     turns = {a: sp.Symbol("E" + a.name) for a in angles}
     touched = [f for f in expression.atoms(sp.sin, sp.cos) if f.args[0].free_symbols & set(angles)]
     if not touched:
@@ -168,13 +174,19 @@ def fourier(expression):
     for f in touched:
         argument = sp.expand(f.args[0])
         phase = argument.subs(dict.fromkeys(angles, 0))
-        E = sp.Mul(*(turns[a] ** argument.coeff(a) for a in angles)) * (sp.cos(phase) + sp.I * sp.sin(phase))
-        inverse = sp.Mul(*(turns[a] ** (-argument.coeff(a)) for a in angles)) * (sp.cos(phase) - sp.I * sp.sin(phase))
+        E = sp.Mul(*(turns[a] ** argument.coeff(a) for a in angles)) * (
+            sp.cos(phase) + sp.I * sp.sin(phase)
+        )
+        inverse = sp.Mul(*(turns[a] ** (-argument.coeff(a)) for a in angles)) * (
+            sp.cos(phase) - sp.I * sp.sin(phase)
+        )
         exchange[f] = (E - inverse) / (2 * sp.I) if f.func is sp.sin else (E + inverse) / 2
     for term in sp.Add.make_args(sp.expand(expression.xreplace(exchange))):
         powers = term.as_powers_dict()
         wave = tuple(int(powers.get(turns[a], 0)) for a in angles)
-        waves[wave].append(term / sp.Mul(*(turns[a] ** k for a, k in zip(angles, wave, strict=True))))
+        waves[wave].append(
+            term / sp.Mul(*(turns[a] ** k for a, k in zip(angles, wave, strict=True)))
+        )
     sums = {wave: sp.expand(sp.Add(*parts)) for wave, parts in waves.items()}
     result = sp.S(0)
     for wave, amplitude in sums.items():
@@ -219,7 +231,9 @@ def energies(robot: Robot, hooks: Hooks | None = None):
         rotation = fourier((omega.T * one.inertia * omega)[0]) / 2
         rotor = one.gear**2 * one.rotor * qd_(k + 1) ** 2 / 2
         K.append(
-            hooks.kinetic(k + 1, translation, rotation, rotor) if hooks.kinetic else translation + rotation + rotor
+            hooks.kinetic(k + 1, translation, rotation, rotor)
+            if hooks.kinetic
+            else translation + rotation + rotor
         )
         high = hooks.height(k + 1, p, T) if hooks.height else p
         height = fourier(-one.m * (gravity.T * high)[0])
@@ -279,7 +293,11 @@ def christoffel(M, n, sign=1):
         for j in range(n):
             entry = sum(
                 (
-                    (sp.diff(M[k, j], q_(i + 1)) + sp.diff(M[k, i], q_(j + 1)) - sp.diff(M[i, j], q_(k + 1)))
+                    (
+                        sp.diff(M[k, j], q_(i + 1))
+                        + sp.diff(M[k, i], q_(j + 1))
+                        - sp.diff(M[i, j], q_(k + 1))
+                    )
                     * qd_(i + 1)
                     for i in range(n)
                 ),
@@ -308,7 +326,8 @@ def with_link(robot: Robot, i: int, **changes) -> Robot:
     """Return a robot with changes to link i, from 1."""
     links = list(robot.links)
     links[i - 1] = replace(
-        links[i - 1], **{k: exact(v) if not isinstance(v, sp.MatrixBase) else v for k, v in changes.items()}
+        links[i - 1],
+        **{k: exact(v) if not isinstance(v, sp.MatrixBase) else v for k, v in changes.items()},
     )
     return replace(robot, links=tuple(links))
 
@@ -325,7 +344,9 @@ def library() -> dict[str, Robot]:
         link("R", a="l1", m="m1", com=("-l1/2", 0, 0), viscous="1/20", **rod("m1", "l1", "y", "z")),
         link("R", a="l2", m="m2", com=("-l2/2", 0, 0), viscous="1/50", **rod("m2", "l2", "y", "z")),
     )
-    third = link("R", a="l3", m="m3", com=("-l3/2", 0, 0), viscous="1/200", **rod("m3", "l3", "y", "z"))
+    third = link(
+        "R", a="l3", m="m3", com=("-l3/2", 0, 0), viscous="1/200", **rod("m3", "l3", "y", "z")
+    )
     two = {"g": 9.81, "l1": 0.5, "l2": 0.4, "m1": 2.0, "m2": 1.5}
     polar = (
         link("R", theta=1, alpha=1, m="m1", com=(0, 0, "l1"), xx="I1", yy="I1", viscous="1/20"),
@@ -341,7 +362,14 @@ def library() -> dict[str, Robot]:
             "cart_pendulum",
             (
                 link("P", alpha=1, m="mc", xx="mc/150", yy="mc/150", zz="mc/150", viscous="1/2"),
-                link("R", a="l", m="mp", com=("-l/2", 0, 0), viscous="1/500", **rod("mp", "l", "y", "z")),
+                link(
+                    "R",
+                    a="l",
+                    m="mp",
+                    com=("-l/2", 0, 0),
+                    viscous="1/500",
+                    **rod("mp", "l", "y", "z"),
+                ),
             ),
             (0, 0, -g),
             {"g": 9.81, "mc": 1.0, "mp": 0.3, "l": 0.6},
@@ -419,7 +447,16 @@ def library() -> dict[str, Robot]:
                     rotor="6e-6",
                     viscous="2.3e-5",
                 ),
-                link("R", m="0.5", xx="0.00018", yy="0.00018", zz="0.00018", gear=20, rotor="5e-6", viscous="3.6e-6"),
+                link(
+                    "R",
+                    m="0.5",
+                    xx="0.00018",
+                    yy="0.00018",
+                    zz="0.00018",
+                    gear=20,
+                    rotor="5e-6",
+                    viscous="3.6e-6",
+                ),
             ),
             (0, 0, "-9.81"),
         ),
@@ -576,7 +613,17 @@ def library() -> dict[str, Robot]:
                 link("R", a="l1", m="m2", com=("r2", 0, 0), zz="J2"),
             ),
             (0, -g, 0),
-            {"g": 9.81, "l1": 0.5, "l2": 0.4, "r1": 0.22, "r2": 0.17, "m1": 2.0, "m2": 1.5, "J1": 0.05, "J2": 0.02},
+            {
+                "g": 9.81,
+                "l1": 0.5,
+                "l2": 0.4,
+                "r1": 0.22,
+                "r2": 0.17,
+                "m1": 2.0,
+                "m2": 1.5,
+                "J1": 0.05,
+                "J2": 0.02,
+            },
             tool=shift(sp.Symbol("l2"), 0, 0),
             modified=True,
         ),
@@ -590,11 +637,22 @@ def library() -> dict[str, Robot]:
             "scara3",
             (
                 link("R", a="l1", d="h", m="m1", com=("-l1/2", 0, 0), **rod("m1", "l1", "y", "z")),
-                link("R", a="l2", alpha=2, m="m2", com=("-l2/2", 0, 0), **rod("m2", "l2", "y", "z")),
+                link(
+                    "R", a="l2", alpha=2, m="m2", com=("-l2/2", 0, 0), **rod("m2", "l2", "y", "z")
+                ),
                 link("P", m="m3", zz="I3"),
             ),
             (0, 0, -g),
-            {"g": 9.81, "h": 0.4, "l1": 0.35, "l2": 0.25, "m1": 6.0, "m2": 4.0, "m3": 1.5, "I3": 0.01},
+            {
+                "g": 9.81,
+                "h": 0.4,
+                "l1": 0.35,
+                "l2": 0.25,
+                "m1": 6.0,
+                "m2": 4.0,
+                "m3": 1.5,
+                "I3": 0.01,
+            },
         ),
         Robot(
             "telescope_mm",

@@ -77,7 +77,8 @@ def squares(e):
         return all(c.is_Integer for c in sp.Poly(a, *sorted(a.free_symbols, key=str)).coeffs())
 
     e = e.replace(
-        lambda f: f.func is sp.cos and f.args[0].free_symbols and two(f), lambda f: 1 - 2 * sp.sin(f.args[0] / 2) ** 2
+        lambda f: f.func is sp.cos and f.args[0].free_symbols and two(f),
+        lambda f: 1 - 2 * sp.sin(f.args[0] / 2) ** 2,
     )
     return e.replace(
         lambda f: f.func is sp.sin and f.args[0].free_symbols and two(f),
@@ -120,7 +121,11 @@ def decimals(value, digits, always=False):
         if node[0] == "/" and node[2][0] == "n":
             if node[1][0] == "n":
                 return ("n", rounded(node[1][1], node[2][1], digits))
-            return ("*", ("n", rounded("1", node[2][1], digits)), *(node[1][1:] if node[1][0] == "*" else (node[1],)))
+            return (
+                "*",
+                ("n", rounded("1", node[2][1], digits)),
+                *(node[1][1:] if node[1][0] == "*" else (node[1],)),
+            )
         return node
 
     if isinstance(value, list):

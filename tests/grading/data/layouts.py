@@ -34,7 +34,11 @@ def toml_sheet(robot, texts, names=None, task=None, tables="") -> str:
     lines = ["format = 1", f'robot = "{robot}"']
     for title, values in (("names", names), ("task", task)):
         if values:
-            lines += ["", f"[{title}]", *(f"{key} = {toml_value(value)}" for key, value in values.items())]
+            lines += [
+                "",
+                f"[{title}]",
+                *(f"{key} = {toml_value(value)}" for key, value in values.items()),
+            ]
     lines += ["", "[answer]"]
     for name, text in texts.items():
         if isinstance(text, str):
@@ -49,7 +53,9 @@ def entry_texts(answers, notation: Notation) -> dict:
     """Return answers entry by entry."""
 
     def text(value):
-        return written(value, notation) if isinstance(value, tuple) else [text(one) for one in value]
+        return (
+            written(value, notation) if isinstance(value, tuple) else [text(one) for one in value]
+        )
 
     return {name: text(value) for name, value in answers.items()}
 
@@ -72,7 +78,11 @@ syms m1 m2 m3 l1 l2 l3 g real
 def matlab_file(answers, style=0, notation=None) -> str:
     """Return a script: matrices in one statement, row by row, or entry by entry."""
     notation = notation or NOTATIONS[("matlab_dots", "matlab_names", "matlab")[style % 3]]
-    lines = [MATLAB_HEADER] if style % 2 == 0 else ["function [M, C, g] = arm(q, qd)", "% all in SI units"]
+    lines = (
+        [MATLAB_HEADER]
+        if style % 2 == 0
+        else ["function [M, C, g] = arm(q, qd)", "% all in SI units"]
+    )
     for name, value in answers.items():
         unit = {"g": " % N m", "tau": " % N m", "M": " % kg m^2"}.get(name, "")
         if shape(value) == 0:
@@ -81,7 +91,9 @@ def matlab_file(answers, style=0, notation=None) -> str:
         rows = [[one] for one in value] if shape(value) == 1 else value
         texts = [[written(one, notation) for one in row] for row in rows]
         if style % 3 == 0:
-            lines.append(f"{name} = [" + "; ...\n     ".join(", ".join(row) for row in texts) + f"];{unit}")
+            lines.append(
+                f"{name} = [" + "; ...\n     ".join(", ".join(row) for row in texts) + f"];{unit}"
+            )
         elif style % 3 == 1:
             name = {"g": "G"}.get(name, name)  # g stays the constant
             lines.append(f"{name} = zeros({len(rows)},{len(rows[0])});")
@@ -91,7 +103,9 @@ def matlab_file(answers, style=0, notation=None) -> str:
                     lines.append(f"{name}({index}) = {broken(one)};{unit}")
         else:
             lines.append(
-                f"{name} = [" + "\n     ".join("  ".join(tight(one) for one in row) for row in texts) + f"];{unit}"
+                f"{name} = ["
+                + "\n     ".join("  ".join(tight(one) for one in row) for row in texts)
+                + f"];{unit}"
             )
     return "\n".join(lines) + "\n"
 
@@ -123,13 +137,19 @@ def python_file(answers, style=0, notation=None) -> str:
     prefix = notation.prefix or "np."
     lines = ["import sympy as sp" if prefix == "sp." else "import numpy as np", ""]
     if prefix == "sp.":
-        lines += ['g, l1, l2, m1, m2 = sp.symbols("g l1 l2 m1 m2", positive=True)', 'q1, q2 = sp.symbols("q1 q2")', ""]
+        lines += [
+            'g, l1, l2, m1, m2 = sp.symbols("g l1 l2 m1 m2", positive=True)',
+            'q1, q2 = sp.symbols("q1 q2")',
+            "",
+        ]
     if style % 3 == 1:
         lines += ["", "def dynamics(q, qd):", '    """Mass matrix and the rest, SI."""']
     pad = "    " if style % 3 == 1 else ""
     for name, value in answers.items():
         if shape(value) == 0:
-            lines.append(f"{pad}{name} = ({broken(written(value, notation), chr(10) + pad + '     ')})")
+            lines.append(
+                f"{pad}{name} = ({broken(written(value, notation), chr(10) + pad + '     ')})"
+            )
             continue
         rows = [[one] for one in value] if shape(value) == 1 else value
         texts = [[written(one, notation) for one in row] for row in rows]
@@ -151,14 +171,24 @@ def python_file(answers, style=0, notation=None) -> str:
     return "\n".join(lines) + "\n"
 
 
-NAMES = {"M": r"\mathbf{M}(q)", "tau": r"\boldsymbol{\tau}", "g": r"\mathbf{g}(q)", "h": r"\mathbf{h}", "C": "C"}
+NAMES = {
+    "M": r"\mathbf{M}(q)",
+    "tau": r"\boldsymbol{\tau}",
+    "g": r"\mathbf{g}(q)",
+    "h": r"\mathbf{h}",
+    "C": "C",
+}
 
 
 def tex_file(answers, style=0, notation=None) -> str:
     """Return a paper: matrices, or align with an entry a row, long ones continued."""
     notation = (
         notation
-        or NOTATIONS[("latex", "latex_short", "latex_q", "latex_roman", "latex_bare", "latex_braces")[style % 6]]
+        or NOTATIONS[
+            ("latex", "latex_short", "latex_q", "latex_roman", "latex_bare", "latex_braces")[
+                style % 6
+            ]
+        ]
     )
     lines = [
         r"\documentclass{article}",
@@ -172,7 +202,9 @@ def tex_file(answers, style=0, notation=None) -> str:
             continue
         if style % 2 == 0 and (shape(value) == 2 or style % 4 == 0):
             rows = [[one] for one in value] if shape(value) == 1 else value
-            body = matrix(rows, notation, ("bmatrix", "pmatrix")[style // 2 % 2]).replace(r"\\ ", "\\\\\n  ")
+            body = matrix(rows, notation, ("bmatrix", "pmatrix")[style // 2 % 2]).replace(
+                r"\\ ", "\\\\\n  "
+            )
             head = {"tau": r"\tau"}.get(name, name) if style % 3 else NAMES.get(name, name)
             lines += [r"\[", f"{head} = {body}", r"\]"]
             continue
@@ -202,13 +234,19 @@ def tex_rows(name, tree, notation, style) -> str:
             text = ""
     rows.append(text)
     begin = (r"&\quad", r"&", r"& \qquad {}")[style // 3 % 3]
-    return f"{name} &= " + f" \\\\\n  {begin}".join(row.strip() if k == 0 else row for k, row in enumerate(rows) if row)
+    return f"{name} &= " + f" \\\\\n  {begin}".join(
+        row.strip() if k == 0 else row for k, row in enumerate(rows) if row
+    )
 
 
 def notebook(answers, style=0) -> str:
     """Return a notebook with one cell of text and one of code."""
     cells = [
-        {"cell_type": "markdown", "metadata": {}, "source": ["# Homework\n", "Lagrange's equations"]},
+        {
+            "cell_type": "markdown",
+            "metadata": {},
+            "source": ["# Homework\n", "Lagrange's equations"],
+        },
         {
             "cell_type": "code",
             "metadata": {},
@@ -217,4 +255,6 @@ def notebook(answers, style=0) -> str:
             "source": python_file(answers, style).splitlines(True),
         },
     ]
-    return json.dumps({"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}, ensure_ascii=False)
+    return json.dumps(
+        {"cells": cells, "metadata": {}, "nbformat": 4, "nbformat_minor": 5}, ensure_ascii=False
+    )

@@ -78,7 +78,19 @@ class Corpus:
             }
         )
 
-    def add(self, name, robot, answers, notation, layout, expected, label, names=None, task=None, whole=None):
+    def add(
+        self,
+        name,
+        robot,
+        answers,
+        notation,
+        layout,
+        expected,
+        label,
+        names=None,
+        task=None,
+        whole=None,
+    ):
         """Write answers (trees by quantity) as a sheet or a document."""
         style = self.turns["style" + layout]
         self.turns["style" + layout] += 1
@@ -98,9 +110,27 @@ class Corpus:
             # g last: a program that names its vector g has no gravity constant left.
             text = maker(dict(sorted(answers.items(), key=lambda item: item[0] == "g")), style)
             notation = layout
-        self.raw(name, robot, suffix, text, expected, label, notation if isinstance(notation, str) else notation.kind)
+        self.raw(
+            name,
+            robot,
+            suffix,
+            text,
+            expected,
+            label,
+            notation if isinstance(notation, str) else notation.kind,
+        )
 
-    def right(self, name, robot, answers, notation="python", layout="toml", expected=RIGHT, reference=None, **how):
+    def right(
+        self,
+        name,
+        robot,
+        answers,
+        notation="python",
+        layout="toml",
+        expected=RIGHT,
+        reference=None,
+        **how,
+    ):
         """Add answers that are right: checked here."""
         answers = {key: trees(value) for key, value in answers.items()}
         known = reference or truth(robot)
@@ -113,19 +143,36 @@ class Corpus:
         how.pop("values", None)
         self.add(name, robot, answers, notation, layout, expected, None, **how)
 
-    def wrong(self, name, robot, answers, mistake, accept, notation="python", layout="toml", reference=None, **how):
+    def wrong(
+        self,
+        name,
+        robot,
+        answers,
+        mistake,
+        accept,
+        notation="python",
+        layout="toml",
+        reference=None,
+        **how,
+    ):
         """Add answers with one mistake: which entries it spoils is found here."""
         answers = {key: trees(value) for key, value in answers.items()}
         known = reference or truth(robot)
         values = how.pop("values", None)
-        spoiled = [entry for key, value in answers.items() for entry in differing(key, value, known[key], values)]
+        spoiled = [
+            entry
+            for key, value in answers.items()
+            for entry in differing(key, value, known[key], values)
+        ]
         if not spoiled:
             return False
         label = {
             "mistake": mistake,
             "accept": sorted({mistake, *([accept] if isinstance(accept, str) else accept)}),
             "entries": spoiled,
-            "quantities": sorted({key for key in answers if any(entry.startswith(key) for entry in spoiled)}),
+            "quantities": sorted(
+                {key for key in answers if any(entry.startswith(key) for entry in spoiled)}
+            ),
         }
         self.add(name, robot, answers, notation, layout, WRONG, label, **how)
         return True
@@ -143,7 +190,12 @@ def main():
         out.writelines(json.dumps(one, ensure_ascii=False) + "\n" for one in corpus.sheets)
     for key in ("robot", "notation", "suffix"):
         print(key, dict(Counter(one[key] for one in corpus.sheets)))
-    print(len(corpus.sheets), "sheets,", sum(one["label"] is not None for one in corpus.sheets), "labelled wrong")
+    print(
+        len(corpus.sheets),
+        "sheets,",
+        sum(one["label"] is not None for one in corpus.sheets),
+        "labelled wrong",
+    )
     print((HERE / "heldout.jsonl").stat().st_size, "bytes")
 
 

@@ -118,9 +118,19 @@ def programs(corpus):
     raw("rebound_mass", "planar2r", ".py", f"m2 = m1\nV = {V}\n", (*WRONG, "unreadable"))
     raw("rebound_after", "planar2r", ".py", f"V = {V}\nV = 2*V\n", (*WRONG, "unreadable"))
     raw(
-        "added_after", "planar2r", ".m", f"V = {V.replace('**', '^')};\nV = V + m1*g*sin(q1);\n", (*WRONG, "unreadable")
+        "added_after",
+        "planar2r",
+        ".m",
+        f"V = {V.replace('**', '^')};\nV = V + m1*g*sin(q1);\n",
+        (*WRONG, "unreadable"),
     )
-    raw("entry_overwritten", "planar2r", ".m", f"g = [{G1}; {G2}];\ng(2) = 0;\n", (*WRONG, "unreadable"))
+    raw(
+        "entry_overwritten",
+        "planar2r",
+        ".m",
+        f"g = [{G1}; {G2}];\ng(2) = 0;\n",
+        (*WRONG, "unreadable"),
+    )
     raw(
         "right_after_wrong",
         "planar2r",
@@ -199,7 +209,13 @@ def programs(corpus):
         f"M11 = m1*l1**2/4 + m2*(l1**2 + l2**2/3 + l1*l2*cos(q2))\nM12 = {M12}\nM21 = M12\nM22 = {M22}\n{g}\n",
         WRONG,
     )
-    raw("symmetric_by_reference", "planar2r", ".py", f"M11 = {M11}\nM12 = {M12}\nM21 = M12\nM22 = {M22}\n", PROVED)
+    raw(
+        "symmetric_by_reference",
+        "planar2r",
+        ".py",
+        f"M11 = {M11}\nM12 = {M12}\nM21 = M12\nM22 = {M22}\n",
+        PROVED,
+    )
     raw(
         "comment_signs",
         "planar2r",
@@ -222,21 +238,34 @@ def write(corpus):
     for k, (name, (robot, answers, expected)) in enumerate(RIGHT.items()):
         tolerance = 1e-3 if expected is ROUNDED else None
         notation = ("python", "latex", "dq1", "latex_q", "matlab")[k % 5]
-        if "abs" in str(answers) or "root" in name or "sec(" in str(answers) or name == "huge_constant_in_V":
+        if (
+            "abs" in str(answers)
+            or "root" in name
+            or "sec(" in str(answers)
+            or name == "huge_constant_in_V"
+        ):
             notation = "python"
-        corpus.right("nasty_" + name, robot, answers, notation, expected=expected, tolerance=tolerance)
+        corpus.right(
+            "nasty_" + name, robot, answers, notation, expected=expected, tolerance=tolerance
+        )
     for name, (robot, answers) in TRICKS.items():
         wrong = {key: trees(value) for key, value in answers.items()}
-        spoiled = [e for key, value in wrong.items() for e in differing(key, value, truth(robot)[key])]
+        spoiled = [
+            e for key, value in wrong.items() for e in differing(key, value, truth(robot)[key])
+        ]
         if name == "equal_below_3" or name == "equal_above_minus_3":
             at = {"m": 1, "g": 1, "lc": 1, "q1": 3.1 if "below" in name else -3.1}
             from grading.data.trees import evaluate
 
-            assert abs(evaluate(wrong["g"][0], at) - evaluate(tree(truth(robot)["g"][0]), at)) > 1e-3
+            assert (
+                abs(evaluate(wrong["g"][0], at) - evaluate(tree(truth(robot)["g"][0]), at)) > 1e-3
+            )
         else:
             assert spoiled, name
         place = f"{robot}.toml" if robot in OWN else robot
-        corpus.raw("nasty_" + name, robot, ".toml", toml_sheet(place, answers), WRONG, None, "python")
+        corpus.raw(
+            "nasty_" + name, robot, ".toml", toml_sheet(place, answers), WRONG, None, "python"
+        )
     programs(corpus)
 
 

@@ -112,12 +112,20 @@ def shifted(node, rng):
     if is_call(node, "cos"):
         x = node[2]
         return rng.choice(
-            [function("sin", sum_of(x, quarter)), function("cos", ("-", x)), ("-", function("cos", sum_of(x, PI)))]
+            [
+                function("sin", sum_of(x, quarter)),
+                function("cos", ("-", x)),
+                ("-", function("cos", sum_of(x, PI))),
+            ]
         )
     if is_call(node, "sin"):
         x = node[2]
         return rng.choice(
-            [function("cos", less(x, quarter)), ("-", function("sin", ("-", x))), function("sin", less(PI, x))]
+            [
+                function("cos", less(x, quarter)),
+                ("-", function("sin", ("-", x))),
+                function("sin", less(PI, x)),
+            ]
         )
     return None
 
@@ -139,8 +147,15 @@ def doubled(node, rng):
     if node[0] == "^" and node[2] == TWO and is_call(node[1], "sin", "cos"):
         double = function("cos", ("*", TWO, node[1][2]))
         if node[1][1] == "cos":
-            return rng.choice([("/", sum_of(ONE, double), TWO), less(ONE, ("^", function("sin", node[1][2]), TWO))])
-        return rng.choice([("/", less(ONE, double), TWO), less(ONE, ("^", function("cos", node[1][2]), TWO))])
+            return rng.choice(
+                [
+                    ("/", sum_of(ONE, double), TWO),
+                    less(ONE, ("^", function("sin", node[1][2]), TWO)),
+                ]
+            )
+        return rng.choice(
+            [("/", less(ONE, double), TWO), less(ONE, ("^", function("cos", node[1][2]), TWO))]
+        )
     return None
 
 
@@ -170,7 +185,12 @@ def powers(node, rng):
 
 
 def numbers(node, rng):
-    if node[0] == "/" and node[1][0] == node[2][0] == "n" and node[1][1].isdigit() and node[2][1].isdigit():
+    if (
+        node[0] == "/"
+        and node[1][0] == node[2][0] == "n"
+        and node[1][1].isdigit()
+        and node[2][1].isdigit()
+    ):
         a, b = int(node[1][1]), int(node[2][1])
         k = rng.choice([2, 3, 5])
         return ("/", ("n", str(a * k)), ("n", str(b * k)))
@@ -196,7 +216,18 @@ def tangent(node, rng):
 
 
 REWRITINGS = [
-    *(commuted, distributed, factored, neutral, pythagoras, shifted, angle_sums, doubled, product_to_sum, powers),
+    *(
+        commuted,
+        distributed,
+        factored,
+        neutral,
+        pythagoras,
+        shifted,
+        angle_sums,
+        doubled,
+        product_to_sum,
+        powers,
+    ),
     *(numbers, divided, tangent),
 ]
 
@@ -274,7 +305,11 @@ def small_coefficient(node, rng):
         return None
     k = rng.randrange(5, 13)
     gap = rng.choice([1, 1, 2, 7])
-    factor = ("n", "1." + str(gap).zfill(k)) if rng.random() < 0.5 else ("n", "0." + str(10**k - gap).zfill(k))
+    factor = (
+        ("n", "1." + str(gap).zfill(k))
+        if rng.random() < 0.5
+        else ("n", "0." + str(10**k - gap).zfill(k))
+    )
     return ("*", factor, node)
 
 
@@ -282,13 +317,17 @@ def large_coefficient(node, rng):
     if node[0] == "n" and node[1].isdigit():
         return ("n", str(int(node[1]) + rng.choice([1, 2, 10])))
     if node[0] in "s*f":
-        return rng.choice([("*", TWO, node), ("/", node, TWO), ("*", ("n", "1.5"), node), ("*", ("n", "0"), node)])
+        return rng.choice(
+            [("*", TWO, node), ("/", node, TWO), ("*", ("n", "1.5"), node), ("*", ("n", "0"), node)]
+        )
     return None
 
 
 def exponent(node, rng):
     if node[0] == "^":
-        return rng.choice([node[1], ("^", node[1], ("n", "3")), ("^", node[1], ("n", "4")), ("*", TWO, node[1])])
+        return rng.choice(
+            [node[1], ("^", node[1], ("n", "3")), ("^", node[1], ("n", "4")), ("*", TWO, node[1])]
+        )
     if node[0] == "s" and node != PI:
         return ("^", node, TWO)
     return None
@@ -318,13 +357,19 @@ def bracket(node, rng):
             k = rng.choice(spots)
             first, *rest = node[k][1:]
             others = [one for i, one in enumerate(node) if i and i != k]
-            moved = ("-", ("*", *others, rest[0][1])) if rest[0][0] == "-" else ("*", *others, rest[0])
+            moved = (
+                ("-", ("*", *others, rest[0][1])) if rest[0][0] == "-" else ("*", *others, rest[0])
+            )
             return ("+", first, moved, *rest[1:])
     if is_call(node, "sin", "cos") and node[2][0] == "+":
         return ("+", function(node[1], node[2][1]), *node[2][2:])
     if node[0] == "^" and node[1][0] in "+*":
         *rest, last = node[1][1:]
-        return (node[1][0], *rest, ("^", last, node[2]) if last[0] != "-" else ("-", ("^", last[1], node[2])))
+        return (
+            node[1][0],
+            *rest,
+            ("^", last, node[2]) if last[0] != "-" else ("-", ("^", last[1], node[2])),
+        )
     return None
 
 
@@ -344,7 +389,18 @@ def angle(node, rng):
     return None
 
 
-SLIPS = [sign, operator, name, small_coefficient, large_coefficient, exponent, function_name, term, bracket, angle]
+SLIPS = [
+    sign,
+    operator,
+    name,
+    small_coefficient,
+    large_coefficient,
+    exponent,
+    function_name,
+    term,
+    bracket,
+    angle,
+]
 
 
 def slipped(tree, rng):
@@ -352,7 +408,11 @@ def slipped(tree, rng):
     while True:
         rule = rng.choice(SLIPS)
         path, node = rng.choice(list(places(tree)))
-        if rule in (small_coefficient, large_coefficient) and inside_angle(tree, path) and rng.random() < 0.7:
+        if (
+            rule in (small_coefficient, large_coefficient)
+            and inside_angle(tree, path)
+            and rng.random() < 0.7
+        ):
             continue
         new = rule(node, rng)
         if new is not None and new != node:

@@ -28,18 +28,38 @@ def by_hand(corpus):
             for _ in range(3 if robot in ("planar2r", "double_pendulum", "polar_rp") else 2):
                 notation = corpus.turn("hand", LINEAR)
                 half = UNDECIDED if "q1/2" in str(answers) else PROVED
-                corpus.right(f"hand_{robot}_{k + 1}_{notation}", robot, answers, notation, expected=half)
+                corpus.right(
+                    f"hand_{robot}_{k + 1}_{notation}", robot, answers, notation, expected=half
+                )
             if not {"K", "A1", "L"} & set(answers):
                 layout = corpus.turn("handdoc", DOCUMENTS)
-                corpus.right(f"hand_{robot}_{k + 1}_{layout}", robot, answers, layout=layout, expected=PROVED)
+                corpus.right(
+                    f"hand_{robot}_{k + 1}_{layout}", robot, answers, layout=layout, expected=PROVED
+                )
 
 
 def by_algebra(corpus):
     """Truths rewritten by computer algebra."""
     plan = ["by_mass", "factored", "single_angles", "common_denominator", "by_cosine", "by_rate", "shifted", "squares",
             "doubles", "sines_shifted"]  # fmt: skip
-    sets = [("M", "g"), ("h",), ("tau",), ("K",), ("V", "g"), ("M",), ("h", "g"), ("C", "g"), ("L",), ("T",), ("J",)]
-    small = [r for r in ROBOTS if r not in ("puma3", "planar3r", "cobra600", "stanford3", "rpr", "cart_double")]
+    sets = [
+        ("M", "g"),
+        ("h",),
+        ("tau",),
+        ("K",),
+        ("V", "g"),
+        ("M",),
+        ("h", "g"),
+        ("C", "g"),
+        ("L",),
+        ("T",),
+        ("J",),
+    ]
+    small = [
+        r
+        for r in ROBOTS
+        if r not in ("puma3", "planar3r", "cobra600", "stanford3", "rpr", "cart_double")
+    ]
     for robot in ROBOTS:
         for _ in range(6 if robot in small else 4):
             form, quantities = corpus.turn("form", plan), corpus.turn("set", sets)
@@ -51,17 +71,27 @@ def by_algebra(corpus):
                 form = "by_cosine"
             known = truth(robot)
             answers = {q: applied(form, known[q]) for q in quantities}
-            if corpus.turn("algebradoc", range(4)) == 3 and not {"T", "J", "L", "K"} & set(quantities):
+            if corpus.turn("algebradoc", range(4)) == 3 and not {"T", "J", "L", "K"} & set(
+                quantities
+            ):
                 layout = corpus.turn("handdoc", DOCUMENTS)
-                corpus.right(f"{form}_{robot}_{'_'.join(quantities)}_{layout}", robot, answers, layout=layout)
+                corpus.right(
+                    f"{form}_{robot}_{'_'.join(quantities)}_{layout}", robot, answers, layout=layout
+                )
             else:
                 notation = corpus.turn("algebra", LINEAR)
-                corpus.right(f"{form}_{robot}_{'_'.join(quantities)}_{notation}", robot, answers, notation)
+                corpus.right(
+                    f"{form}_{robot}_{'_'.join(quantities)}_{notation}", robot, answers, notation
+                )
     for robot, quantity in (("planar2r", "g"), ("planar2r", "M"), ("cart_pendulum", "M"), ("double_pendulum", "h"),
                             ("pendulum1", "g"), ("craig2r", "g"), ("polar_rp", "V")):  # fmt: skip
         answers = {quantity: applied("half_angles", truth(robot)[quantity])}
         corpus.right(
-            f"half_angles_{robot}_{quantity}", robot, answers, corpus.turn("algebra", LINEAR[:6]), expected=UNDECIDED
+            f"half_angles_{robot}_{quantity}",
+            robot,
+            answers,
+            corpus.turn("algebra", LINEAR[:6]),
+            expected=UNDECIDED,
         )
 
 
@@ -103,7 +133,11 @@ def from_sympy(corpus):
         robot, quantities = jobs[k % len(jobs)]
 
         def text(value, render=render):
-            return [text(one) for one in value] if isinstance(value, list) else render(sp.sympify(value))
+            return (
+                [text(one) for one in value]
+                if isinstance(value, list)
+                else render(sp.sympify(value))
+            )
 
         place = f"{robot}.toml" if robot in OWN else robot
         sheet = toml_sheet(place, {q: text(truth(robot)[q]) for q in quantities})
@@ -117,9 +151,17 @@ def from_sympy(corpus):
                        "sympy_" + name)  # fmt: skip
     pretty = {"double_pendulum": "g", "gantry": "g"}
     for robot, quantity in pretty.items():
-        texts = {quantity: [sp.pretty(sp.sympify(e), use_unicode=True) for e in truth(robot)[quantity]]}
+        texts = {
+            quantity: [sp.pretty(sp.sympify(e), use_unicode=True) for e in truth(robot)[quantity]]
+        }
         corpus.raw(
-            f"sympy_pretty_{robot}", robot, ".toml", toml_sheet(f"{robot}.toml", texts), PROVED, None, "sympy_pretty"
+            f"sympy_pretty_{robot}",
+            robot,
+            ".toml",
+            toml_sheet(f"{robot}.toml", texts),
+            PROVED,
+            None,
+            "sympy_pretty",
         )
 
 
@@ -153,7 +195,11 @@ def from_systems(corpus):
         names={name: rf"{{\it {name[0]}_{name[1:]}}}" for name in letters if name[1:].isdigit()},
     )
     for robot in ("planar2r", "double_pendulum", "craig2r", "scara3", "geared2r"):
-        for label, notation in (("matlab", matlab), ("mathematica", mathematica), ("maxima", maxima)):
+        for label, notation in (
+            ("matlab", matlab),
+            ("mathematica", mathematica),
+            ("maxima", maxima),
+        ):
             quantities = corpus.turn("systems", [("M", "g"), ("h",), ("g", "V"), ("tau",)])
             answers = {q: applied("as_is", truth(robot)[q]) for q in quantities}
             name = f"tex_of_{label}_{robot}_{'_'.join(quantities)}"
@@ -164,26 +210,64 @@ def from_systems(corpus):
 def own_names(corpus):
     """Names of joint variables and parameters of one's own, and absolute angles."""
     ab = Notation(
-        names={"q1": "alpha", "q2": "beta", "qd1": "alphad", "qd2": "betad", "qdd1": "alphadd", "qdd2": "betadd"}
+        names={
+            "q1": "alpha",
+            "q2": "beta",
+            "qd1": "alphad",
+            "qd2": "betad",
+            "qdd1": "alphadd",
+            "qdd2": "betadd",
+        }
     )
     ab_names = {"q": ["alpha", "beta"], "qd": ["alphad", "betad"], "qdd": ["alphadd", "betadd"]}
-    w = Notation(power="^", names={"qd1": "w1", "qd2": "w2", "qdd1": "al1", "qdd2": "al2", "q1": "th1", "q2": "th2"})
+    w = Notation(
+        power="^",
+        names={"qd1": "w1", "qd2": "w2", "qdd1": "al1", "qdd2": "al2", "q1": "th1", "q2": "th2"},
+    )
     w_names = {"q": ["th1", "th2"], "qd": ["w1", "w2"], "qdd": ["al1", "al2"]}
-    phi = Notation("latex", q=r"\varphi_{}", times=" ", names={"qd1": r"\omega_1", "qd2": r"\omega_2"})
+    phi = Notation(
+        "latex", q=r"\varphi_{}", times=" ", names={"qd1": r"\omega_1", "qd2": r"\omega_2"}
+    )
     phi_names = {"q": [r"\varphi_1", r"\varphi_2"], "qd": [r"\omega_1", r"\omega_2"]}
-    rho = Notation(names={"q1": "phi", "q2": "r", "qd1": "phidot", "qd2": "rdot", "qdd1": "phiddot", "qdd2": "rddot"})
+    rho = Notation(
+        names={
+            "q1": "phi",
+            "q2": "r",
+            "qd1": "phidot",
+            "qd2": "rdot",
+            "qdd1": "phiddot",
+            "qdd2": "rddot",
+        }
+    )
     rho_names = {"q": ["phi", "r"]}
     x = Notation(
-        names={"q1": "x", "q2": "theta", "qd1": "xdot", "qd2": "thetadot", "qdd1": "xddot", "qdd2": "thetaddot"}
+        names={
+            "q1": "x",
+            "q2": "theta",
+            "qd1": "xdot",
+            "qd2": "thetadot",
+            "qdd1": "xddot",
+            "qdd2": "thetaddot",
+        }
     )
     x_names = {"q": ["x", "theta"]}
     for robot in ("planar2r", "double_pendulum", "payload2r", "geared2r"):
-        for label, notation, names in (("ab", ab, ab_names), ("w", w, w_names), ("phi", phi, phi_names)):
+        for label, notation, names in (
+            ("ab", ab, ab_names),
+            ("w", w, w_names),
+            ("phi", phi, phi_names),
+        ):
             quantities = corpus.turn("names", [("M", "h"), ("K",), ("h", "g"), ("tau",)])
             if label == "phi":
                 quantities = corpus.turn("namesphi", [("h",), ("M", "h", "g"), ("K", "V")])
             answers = {q: applied("by_mass", truth(robot)[q]) for q in quantities}
-            corpus.right(f"names_{label}_{robot}_{'_'.join(quantities)}", robot, answers, notation, names=names)
+            corpus.right(
+                f"names_{label}_{robot}_{'_'.join(quantities)}",
+                robot,
+                answers,
+                notation,
+                names=names,
+            )
     for robot in ("polar_rp", "incline_rp"):
         answers = {q: applied("factored", truth(robot)[q]) for q in ("M", "h", "g", "tau")}
         corpus.right(f"names_rho_{robot}", robot, answers, rho, names=rho_names)
@@ -192,7 +276,10 @@ def own_names(corpus):
     half = {"lc1": "l1/2", "lc2": "l2/2", "I1": "m1*l1^2/12", "I2": "m2*l2^2/12"}
     text = {
         "M": [
-            ["m1*lc1**2 + I1 + m2*(l1**2 + lc2**2 + 2*l1*lc2*cos(q2)) + I2", "m2*(lc2**2 + l1*lc2*cos(q2)) + I2"],
+            [
+                "m1*lc1**2 + I1 + m2*(l1**2 + lc2**2 + 2*l1*lc2*cos(q2)) + I2",
+                "m2*(lc2**2 + l1*lc2*cos(q2)) + I2",
+            ],
             ["m2*(lc2**2 + l1*lc2*cos(q2)) + I2", "m2*lc2**2 + I2"],
         ],
         "g": ["(m1*lc1 + m2*l1)*g*cos(q1) + m2*lc2*g*cos(q1 + q2)", "m2*lc2*g*cos(q1 + q2)"],
@@ -201,7 +288,8 @@ def own_names(corpus):
     reference = {}
     for key, value in text.items():
         reference[key] = [
-            [put(e, replace) for e in row] if isinstance(row, list) else put(row, replace) for row in value
+            [put(e, replace) for e in row] if isinstance(row, list) else put(row, replace)
+            for row in value
         ]
     corpus.right("names_lc_check_planar2r", "planar2r", reference, "python")
     for notation in ("python", "latex", "matlab", "mathematica", "latex_braces", "short"):
@@ -226,7 +314,10 @@ def put(text, replace):
 
 ABSOLUTE = {
     "planar2r": {
-        "M": [["(m1/3 + m2)*l1**2", "m2*l1*l2/2*cos(q2 - q1)"], ["m2*l1*l2/2*cos(q1 - q2)", "m2*l2**2/3"]],
+        "M": [
+            ["(m1/3 + m2)*l1**2", "m2*l1*l2/2*cos(q2 - q1)"],
+            ["m2*l1*l2/2*cos(q1 - q2)", "m2*l2**2/3"],
+        ],
         "h": ["-m2*l1*l2/2*sin(q2 - q1)*qd2**2", "m2*l1*l2/2*sin(q2 - q1)*qd1**2"],
         "g": ["(m1/2 + m2)*g*l1*cos(q1)", "m2*g*l2/2*cos(q2)"],
         "V": "(m1/2 + m2)*g*l1*sin(q1) + m2*g*l2/2*sin(q2)",
@@ -281,7 +372,9 @@ def in_numbers(corpus):
     for robot in ("planar2r", "scara3", "geared2r"):
         for digits in (4, 5, 6, 17):
             answers = {q: decimals(applied("as_is", truth(robot)[q]), digits) for q in ("M", "h")}
-            notation = corpus.turn("numbers", ["latex_short", "matlab_dots", "unicode", "short", "maple", "python"])
+            notation = corpus.turn(
+                "numbers", ["latex_short", "matlab_dots", "unicode", "short", "maple", "python"]
+            )
             corpus.right(f"thirds_{robot}_{digits}", robot, answers, notation, expected=rounded,
                          tolerance=10 ** (2 - digits) if digits < 17 else 1e-15)  # fmt: skip
     for robot in ("planar2r", "double_pendulum", "polar_rp", "cart_pendulum"):
@@ -322,7 +415,9 @@ INVERSE = {
             "atan2(r21, r11) - q1 - q2",
         ]
     ],
-    "scara3": [["atan2(py, px) - atan2(l2*sin(q2), l1 + l2*cos(q2))", f"-acos({PLANAR_C2})", "h - pz"]],
+    "scara3": [
+        ["atan2(py, px) - atan2(l2*sin(q2), l1 + l2*cos(q2))", f"-acos({PLANAR_C2})", "h - pz"]
+    ],
     "gantry": [["py", "pz"]],
     "stanford3": [
         [
@@ -334,19 +429,29 @@ INVERSE = {
     "telescope_mm": [["atan2(py, px)", "sqrt(px**2 + py**2) - 0.15"]],
     "craig2r": [["atan2(py, px) - atan2(l2*sin(q2), l1 + l2*cos(q2))", f"acos({PLANAR_C2})"]],
     "pan_tilt": [["atan2(py, px)", "atan2(pz - 0.08, px*cos(q1) + py*sin(q1))"]],
-    "rpr": [["atan2(py - l3*r21, px - l3*r11)", "sqrt((px - l3*r11)**2 + (py - l3*r21)**2)", "atan2(r21, r11) - q1"]],
+    "rpr": [
+        [
+            "atan2(py - l3*r21, px - l3*r11)",
+            "sqrt((px - l3*r11)**2 + (py - l3*r21)**2)",
+            "atan2(r21, r11) - q1",
+        ]
+    ],
 }
 
 
 INVERSE = {
-    robot: [[first.replace("q2", f"({rest[0]})") if rest else first, *rest] for first, *rest in branches]
+    robot: [
+        [first.replace("q2", f"({rest[0]})") if rest else first, *rest] for first, *rest in branches
+    ]
     for robot, branches in INVERSE.items()
 }
 
 
 def ik_notation(kind):
     """Return a notation for poses: LaTeX writes p_x and r_{21}."""
-    pose = {f"p{a}": f"p_{a}" for a in "xyz"} | {f"r{i}{j}": f"r_{{{i}{j}}}" for i in (1, 2, 3) for j in (1, 2, 3)}
+    pose = {f"p{a}": f"p_{a}" for a in "xyz"} | {
+        f"r{i}{j}": f"r_{{{i}{j}}}" for i in (1, 2, 3) for j in (1, 2, 3)
+    }
     if kind == "latex":
         return Notation("latex", q="q_{}", times=" ", names=pose)
     return Notation() if kind == "python" else Notation(power="^", times="*")
@@ -384,13 +489,19 @@ def closes(robot, branch, poses=6):
             pose = {**{f"r{i + 1}{j + 1}": evaluate(T[i][j], state) for i in range(3) for j in range(3)},
                     **{f"p{a}": evaluate(T[i][3], state) for i, a in enumerate("xyz")}}  # fmt: skip
             found = {**ROBOTS[robot].values, **pose}
-            found = {k: mpmath.mpf(str(v)) if isinstance(v, float | int) else v for k, v in found.items()}
+            found = {
+                k: mpmath.mpf(str(v)) if isinstance(v, float | int) else v for k, v in found.items()
+            }
             try:
                 for i, formula in enumerate(branch):
                     found[f"q{i + 1}"] = evaluate(parse(formula), found)
-                gap = max(abs(evaluate(T[i][3], found) - pose[f"p{a}"]) for i, a in enumerate("xyz"))
+                gap = max(
+                    abs(evaluate(T[i][3], found) - pose[f"p{a}"]) for i, a in enumerate("xyz")
+                )
                 if n == 3 and robot in ("planar3r", "rpr"):
-                    gap = max(gap, *(abs(evaluate(T[i][0], found) - pose[f"r{i + 1}1"]) for i in range(2)))
+                    gap = max(
+                        gap, *(abs(evaluate(T[i][0], found) - pose[f"r{i + 1}1"]) for i in range(2))
+                    )
             except (ValueError, ZeroDivisionError, TypeError):
                 gap = mpmath.mpf(1)
             good += bool(abs(gap) < mpmath.mpf("1e-30"))
@@ -410,11 +521,23 @@ def inverse(corpus):
 TABLES = {
     "planar2r": ("standard", [["q1", "0", "l1", "0"], ["q2", "0", "l2", "0"]]),
     "polar_rp": ("standard", [["q1 + pi/2", "0", "0", "pi/2"], ["0", "q2", "0", "0"]]),
-    "scara3": ("standard", [["q1", "h", "l1", "0"], ["q2", "0", "l2", "pi"], ["0", "q3", "0", "0"]]),
-    "stanford3": ("standard", [["q1", "d1", "0", "-pi/2"], ["q2", "d2", "0", "pi/2"], ["0", "q3", "0", "0"]]),
+    "scara3": (
+        "standard",
+        [["q1", "h", "l1", "0"], ["q2", "0", "l2", "pi"], ["0", "q3", "0", "0"]],
+    ),
+    "stanford3": (
+        "standard",
+        [["q1", "d1", "0", "-pi/2"], ["q2", "d2", "0", "pi/2"], ["0", "q3", "0", "0"]],
+    ),
     "craig2r": ("modified", [["q1", "0", "0", "0"], ["q2", "0", "l1", "0"]]),
-    "puma3": ("standard", [["q1", "0", "0", "pi/2"], ["q2", "0", "a2", "0"], ["q3", "d3", "a3", "-pi/2"]]),
-    "rpr": ("standard", [["q1 + pi/2", "0", "0", "pi/2"], ["0", "q2", "0", "-pi/2"], ["q3 - pi/2", "0", "l3", "0"]]),
+    "puma3": (
+        "standard",
+        [["q1", "0", "0", "pi/2"], ["q2", "0", "a2", "0"], ["q3", "d3", "a3", "-pi/2"]],
+    ),
+    "rpr": (
+        "standard",
+        [["q1 + pi/2", "0", "0", "pi/2"], ["0", "q2", "0", "-pi/2"], ["q3 - pi/2", "0", "l3", "0"]],
+    ),
     "telescope_mm": ("standard", [["q1 + pi/2", "0", "0", "pi/2"], ["0", "q2 + 0.15", "0", "0"]]),
     "pan_tilt": ("standard", [["q1", "0.08", "0", "pi/2"], ["q2", "0", "0.05", "0"]]),
 }
@@ -426,30 +549,63 @@ def table_sheet(robot, convention, rows):
 
     place = f"{robot}.toml" if robot in OWN else robot
     body = "\n".join(f"    {toml_value(row)}," for row in rows)
-    return toml_sheet(place, {}, tables=f'\n[answer.dh]\nconvention = "{convention}"\nrows = [\n{body}\n]\n')
+    return toml_sheet(
+        place, {}, tables=f'\n[answer.dh]\nconvention = "{convention}"\nrows = [\n{body}\n]\n'
+    )
 
 
 def tables(corpus):
     """Tables, by Python's names and by LaTeX."""
     for robot, (convention, rows) in TABLES.items():
-        corpus.raw(f"dh_{robot}", robot, ".toml", table_sheet(robot, convention, rows), PROVED, None, "table")
+        corpus.raw(
+            f"dh_{robot}",
+            robot,
+            ".toml",
+            table_sheet(robot, convention, rows),
+            PROVED,
+            None,
+            "table",
+        )
         latex = {"pi/2": r"\frac{\pi}{2}", "-pi/2": r"-\frac{\pi}{2}", "pi": r"\pi", "q1 + pi/2": r"\theta_1 + \pi/2",
                  "q1": r"\theta_1", "q2": "d_2" if robot in ("polar_rp", "rpr") else r"\theta_2"}  # fmt: skip
         if robot in ("planar2r", "polar_rp", "scara3", "stanford3", "rpr"):
             written = [[latex.get(e, e) for e in row] for row in rows]
             corpus.raw(
-                f"dh_{robot}_latex", robot, ".toml", table_sheet(robot, convention, written), PROVED, None, "table"
+                f"dh_{robot}_latex",
+                robot,
+                ".toml",
+                table_sheet(robot, convention, written),
+                PROVED,
+                None,
+                "table",
             )
 
 
 def transforms(corpus):
     """Link transforms, poses and Jacobians."""
-    for robot in ("rpr", "scara3", "puma3", "polar_rp", "stanford3", "planar3r", "cart_double", "pan_tilt"):
+    for robot in (
+        "rpr",
+        "scara3",
+        "puma3",
+        "polar_rp",
+        "stanford3",
+        "planar3r",
+        "cart_double",
+        "pan_tilt",
+    ):
         quantities = corpus.turn("kin", [("A1", "A2", "T"), ("T", "J"), ("J",), ("T",)])
         form = corpus.turn("kinform", ["as_is", "single_angles", "factored"])
         answers = {q: applied(form, truth(robot)[q]) for q in quantities}
-        notation = corpus.turn("kinnotation", ["python", "latex_short", "matlab", "latex", "mathematica", "maxima"])
-        corpus.right(f"kin_{robot}_{'_'.join(quantities)}_{notation}", robot, answers, notation, expected=PROVED)
+        notation = corpus.turn(
+            "kinnotation", ["python", "latex_short", "matlab", "latex", "mathematica", "maxima"]
+        )
+        corpus.right(
+            f"kin_{robot}_{'_'.join(quantities)}_{notation}",
+            robot,
+            answers,
+            notation,
+            expected=PROVED,
+        )
 
 
 def write(corpus):

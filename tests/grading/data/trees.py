@@ -17,7 +17,22 @@ from itertools import pairwise
 import mpmath
 
 DIGITS = 50
-FUNCTIONS = {"sin", "cos", "tan", "sqrt", "atan", "atan2", "acos", "asin", "abs", "exp", "sec", "cot", "min", "max"}
+FUNCTIONS = {
+    "sin",
+    "cos",
+    "tan",
+    "sqrt",
+    "atan",
+    "atan2",
+    "acos",
+    "asin",
+    "abs",
+    "exp",
+    "sec",
+    "cot",
+    "min",
+    "max",
+}
 VARIABLE = re.compile(r"(qdd|qd|q)(\d+)")
 SHORTHAND = re.compile(r"([sc])(\d{1,4})")
 
@@ -139,7 +154,9 @@ def replaced(tree, path, new):
 
 def mapped(tree, change):
     """Return a tree rebuilt from its leaves, each node passed through ``change``."""
-    return change(tuple(mapped(child, change) if isinstance(child, tuple) else child for child in tree))
+    return change(
+        tuple(mapped(child, change) if isinstance(child, tuple) else child for child in tree)
+    )
 
 
 def terms(tree) -> list[tuple[int, tuple]]:
@@ -194,7 +211,14 @@ class Notation:
 
 
 SUM, PRODUCT, SIGN, POWER, ATOM = range(1, 6)
-MATHEMATICA = {"sin": "Sin", "cos": "Cos", "tan": "Tan", "sqrt": "Sqrt", "abs": "Abs", "atan": "ArcTan"}
+MATHEMATICA = {
+    "sin": "Sin",
+    "cos": "Cos",
+    "tan": "Tan",
+    "sqrt": "Sqrt",
+    "abs": "Abs",
+    "atan": "ArcTan",
+}
 GREEK = {"beta": r"\beta"}
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -213,7 +237,9 @@ def symbol(name: str, notation: Notation) -> str:
     if joint:
         pattern = {"q": notation.q, "qd": notation.qd, "qdd": notation.qdd}[joint[1]]
         index = int(joint[2]) - 1 + notation.first
-        return pattern.format(str(index).translate(SUBSCRIPTS) if notation.kind == "unicode" else index)
+        return pattern.format(
+            str(index).translate(SUBSCRIPTS) if notation.kind == "unicode" else index
+        )
     if notation.kind == "latex":
         if name == "pi":
             return r"\pi"
@@ -234,7 +260,9 @@ def symbol(name: str, notation: Notation) -> str:
             else {"beta": "β", "pi": "π"}.get(name, name)
         )
     if name == "pi":
-        return {"mathematica": "Pi", "maple": "Pi", "maxima": "%pi"}.get(notation.kind, notation.prefix + "pi")
+        return {"mathematica": "Pi", "maple": "Pi", "maxima": "%pi"}.get(
+            notation.kind, notation.prefix + "pi"
+        )
     return name
 
 
@@ -265,13 +293,17 @@ def _linear(tree, notation):
         text = ""
         for k, one in enumerate(tree[1:]):
             negative = one[0] == "-"
-            part = _bracket(_linear(one[1] if negative else one, notation), PRODUCT if k or negative else SUM)
+            part = _bracket(
+                _linear(one[1] if negative else one, notation), PRODUCT if k or negative else SUM
+            )
             if part.startswith("-") and k:
                 part = f"({part})"
             text += (" - " if negative else " + ") + part if k else ("-" if negative else "") + part
         return text, SUM
     if kind == "-":
-        return "-" + _bracket(_linear(tree[1], notation), SIGN if tree[1][0] in "+-" else PRODUCT), SUM
+        return "-" + _bracket(
+            _linear(tree[1], notation), SIGN if tree[1][0] in "+-" else PRODUCT
+        ), SUM
     if kind == "*":
         parts = []
         for k, one in enumerate(tree[1:]):
@@ -343,11 +375,19 @@ def _latex(tree, notation):
         parts = [bracket(one, POWER if one[0] in "+-" else PRODUCT) for one in tree[1:]]
         text = parts[0]
         for before, one in pairwise(parts):
-            numbers = before.replace(".", "").isdigit() and one.startswith(("\\frac", "\\dfrac", "\\tfrac"))
+            numbers = before.replace(".", "").isdigit() and one.startswith(
+                ("\\frac", "\\dfrac", "\\tfrac")
+            )
             text += (r" \cdot " if numbers or one[0] in ".0123456789" else notation.times) + one
         return text, PRODUCT
     if kind == "/":
-        frac = r"\dfrac" if "dfrac" in notation.options else r"\tfrac" if "tfrac" in notation.options else r"\frac"
+        frac = (
+            r"\dfrac"
+            if "dfrac" in notation.options
+            else r"\tfrac"
+            if "tfrac" in notation.options
+            else r"\frac"
+        )
         return f"{frac}{{{_latex(tree[1], notation)[0]}}}{{{_latex(tree[2], notation)[0]}}}", POWER
     if kind == "^":
         exponent = _latex(tree[2], notation)[0]
@@ -358,7 +398,11 @@ def _latex(tree, notation):
                 return f"{text}^{exponent}", POWER
             return f"\\{tree[1][1]}^{exponent}{text[4:]}", POWER
         base = bracket(tree[1], ATOM)
-        if tree[1][0] == "s" and VARIABLE.fullmatch(tree[1][1]) and tree[1][1] not in notation.names:
+        if (
+            tree[1][0] == "s"
+            and VARIABLE.fullmatch(tree[1][1])
+            and tree[1][1] not in notation.names
+        ):
             return f"{base}^{exponent}", POWER
         return f"{base}^{exponent}", POWER
     name = tree[1]
@@ -373,7 +417,12 @@ def _latex(tree, notation):
         return rf"\left|{_latex(tree[2], notation)[0]}\right|", ATOM
     inside = ", ".join(_latex(one, notation)[0] for one in tree[2:])
     bare = "bare" in notation.options and len(tree) == 3 and tree[2][0] == "s"
-    command = {"atan2": r"\operatorname{atan2}", "acos": r"\arccos", "atan": r"\arctan", "asin": r"\arcsin"}
+    command = {
+        "atan2": r"\operatorname{atan2}",
+        "acos": r"\arccos",
+        "atan": r"\arctan",
+        "asin": r"\arcsin",
+    }
     head = command.get(name, "\\" + name)
     return (f"{head} {inside}" if bare else f"{head}{left}{inside}{right}"), POWER if bare else ATOM
 
@@ -390,12 +439,28 @@ NOTATIONS = {
     "short_star": Notation(shorthand=True, power="^", qd="dq{}", qdd="ddq{}"),
     "prime": Notation(q="th{}", qd="th{}'", qdd="th{}''", power="^"),
     "matlab": Notation("matlab", q="q({})", qd="dq({})", qdd="ddq({})", power="^"),
-    "matlab_dots": Notation("matlab", q="q{}", qd="qd{}", qdd="qdd{}", times=".*", power=".^", divide="./"),
+    "matlab_dots": Notation(
+        "matlab", q="q{}", qd="qd{}", qdd="qdd{}", times=".*", power=".^", divide="./"
+    ),
     "matlab_names": Notation("matlab", q="th{}", qd="thd{}", qdd="thdd{}", power="^"),
-    "latex": Notation("latex", q=r"\theta_{}", qd=r"\dot{{\theta}}_{}", qdd=r"\ddot{{\theta}}_{}", times=" "),
-    "latex_q": Notation("latex", q="q_{}", qd=r"\dot q_{}", qdd=r"\ddot q_{}", times=" ", options=frozenset({"left"})),
+    "latex": Notation(
+        "latex", q=r"\theta_{}", qd=r"\dot{{\theta}}_{}", qdd=r"\ddot{{\theta}}_{}", times=" "
+    ),
+    "latex_q": Notation(
+        "latex",
+        q="q_{}",
+        qd=r"\dot q_{}",
+        qdd=r"\ddot q_{}",
+        times=" ",
+        options=frozenset({"left"}),
+    ),
     "latex_short": Notation(
-        "latex", q=r"\theta_{}", qd=r"\dot\theta_{}", qdd=r"\ddot\theta_{}", times=" ", shorthand=True
+        "latex",
+        q=r"\theta_{}",
+        qd=r"\dot\theta_{}",
+        qdd=r"\ddot\theta_{}",
+        times=" ",
+        shorthand=True,
     ),
     "latex_roman": Notation(
         "latex",
@@ -422,11 +487,19 @@ NOTATIONS = {
         times=" ",
         options=frozenset({"left", "tfrac"}),
     ),
-    "mathematica": Notation("mathematica", q="q{}[t]", qd="q{}'[t]", qdd="q{}''[t]", times=" ", power="^"),
+    "mathematica": Notation(
+        "mathematica", q="q{}[t]", qd="q{}'[t]", qdd="q{}''[t]", times=" ", power="^"
+    ),
     "mathematica_star": Notation(
         "mathematica", q="\\[Theta]{}[t]", qd="\\[Theta]{}'[t]", qdd="\\[Theta]{}''[t]", power="^"
     ),
-    "maple": Notation("maple", q="theta[{}](t)", qd="diff(theta[{}](t), t)", qdd="diff(theta[{}](t), t, t)", power="^"),
+    "maple": Notation(
+        "maple",
+        q="theta[{}](t)",
+        qd="diff(theta[{}](t), t)",
+        qdd="diff(theta[{}](t), t, t)",
+        power="^",
+    ),
     "maxima": Notation("maxima", q="q{}", qd="'diff(q{}, t)", qdd="'diff(q{}, t, 2)", power="^"),
     "unicode": Notation("unicode", q="θ{}", qd="θ̇{}", qdd="θ̈{}", times="·", power="^"),
     "unicode_q": Notation("unicode", q="q{}", qd="q̇{}", qdd="q̈{}", times=" ", power="^"),

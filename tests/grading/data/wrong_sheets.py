@@ -137,12 +137,19 @@ def substituted(robot, replaced):
     links = tuple(
         replace(
             one,
-            **{k: put(getattr(one, k)) for k in ("theta", "d", "a", "m", "com", "inertia", "gear", "rotor", "viscous")},
+            **{
+                k: put(getattr(one, k))
+                for k in ("theta", "d", "a", "m", "com", "inertia", "gear", "rotor", "viscous")
+            },
         )
         for one in robot.links
     )
     return replace(
-        robot, links=links, base=put(robot.base), tool=put(robot.tool), payload=put(sp.sympify(robot.payload))
+        robot,
+        links=links,
+        base=put(robot.base),
+        tool=put(robot.tool),
+        payload=put(sp.sympify(robot.payload)),
     )
 
 
@@ -162,7 +169,13 @@ def derivation(w):
         w.derived(
             "gravity_sign",
             robot,
-            {"gravity_sign", "potential_gradient_sign", "parameter_sign", "entry_sign", "length_sign"},
+            {
+                "gravity_sign",
+                "potential_gradient_sign",
+                "parameter_sign",
+                "entry_sign",
+                "length_sign",
+            },
             qs,
             down,
         )
@@ -179,7 +192,11 @@ def derivation(w):
         )
     for robot, i, qs in (("planar2r", 1, ("g",)), ("geared2r", 2, ("V", "g")), ("payload2r", 2, ("g",)), ("rpr", 3, ("g",)),
                          ("craig2r", 2, ("V",))):  # fmt: skip
-        end = (lambda F, r=robot: (F[-1] * R[r].tool)[:3, 3]) if robot == "craig2r" else (lambda F, i=i: origin(i, F))
+        end = (
+            (lambda F, r=robot: (F[-1] * R[r].tool)[:3, 3])
+            if robot == "craig2r"
+            else (lambda F, i=i: origin(i, F))
+        )
         hooks = Hooks(height=lambda k, p, F, i=i, end=end: end(F) if k == i else p)
         w.derived("height_of_end", robot,
                   {"height_at_end", "com_at_end", "parameter_for_another", "parameter_doubled"}, qs, hooks=hooks, tag=f"link{i}")  # fmt: skip
@@ -200,10 +217,21 @@ def derivation(w):
             moved,
             tag=f"link{i}",
         )
-    for robot, i in (("planar2r", 2), ("planar3r", 2), ("payload2r", 2), ("cart_double", 3), ("scara3", 2), ("rpr", 3)):
-        hooks = Hooks(omega=lambda k, omega, i=i, robot=robot: _own_rate(omega, k, robot) if k == i else omega)
+    for robot, i in (
+        ("planar2r", 2),
+        ("planar3r", 2),
+        ("payload2r", 2),
+        ("cart_double", 3),
+        ("scara3", 2),
+        ("rpr", 3),
+    ):
+        hooks = Hooks(
+            omega=lambda k, omega, i=i, robot=robot: _own_rate(omega, k, robot) if k == i else omega
+        )
         if robot != "cart_double":
-            split = {"parameter_forgotten"} if robot == "payload2r" else set()  # the file's link 2 carries the payload
+            split = (
+                {"parameter_forgotten"} if robot == "payload2r" else set()
+            )  # the file's link 2 carries the payload
             w.derived(
                 "omega_of_own_joint",
                 robot,
@@ -226,16 +254,28 @@ def derivation(w):
         for label, share, accept in (
             ("rod_about_end", sp.Rational(1, 3), {"inertia_about_joint"}),
             ("disc_for_rod", sp.Rational(1, 2), {"inertia_of_disc", "inertia_shape"}),
-            ("point_mass_for_rod", sp.S(1), {"inertia_of_point", "inertia_shape", "inertia_of_point_mass"}),
+            (
+                "point_mass_for_rod",
+                sp.S(1),
+                {"inertia_of_point", "inertia_shape", "inertia_of_point_mass"},
+            ),
             ("cylinder_quarter", sp.Rational(1, 4), {"inertia_shape", "inertia_of_disc_diameter"}),
             ("sphere_for_rod", sp.Rational(2, 5), {"inertia_shape", "inertia_of_sphere"}),
             ("rod_with_half_length", sp.Rational(1, 48), {"inertia_half_length", "inertia_shape"}),
             ("rod_sixth", sp.Rational(1, 6), {"inertia_doubled"}),
         ):
-            if robot in ("planar3r", "scara3") and label in ("sphere_for_rod", "cylinder_quarter", "rod_sixth"):
+            if robot in ("planar3r", "scara3") and label in (
+                "sphere_for_rod",
+                "cylinder_quarter",
+                "rod_sixth",
+            ):
                 continue
             tensor = share * mass * length**2 * sp.diag(0, 1, 1)
-            extra = {"inertia_about_joint", "inertia_doubled"} if label in ("rod_about_end", "rod_sixth") else set()
+            extra = (
+                {"inertia_about_joint", "inertia_doubled"}
+                if label in ("rod_about_end", "rod_sixth")
+                else set()
+            )
             w.derived(
                 label,
                 robot,
@@ -248,7 +288,12 @@ def derivation(w):
         length = sp.Symbol("l1" if i == 1 else "l")
         end = derive.with_link(R[robot], i, com=-sp.Matrix([length, 0, 0]))
         w.derived(
-            "no_parallel_axis", robot, {"inertia_about_com_at_joint", "velocity_at_joint"}, ("M",), end, tag=f"link{i}"
+            "no_parallel_axis",
+            robot,
+            {"inertia_about_com_at_joint", "velocity_at_joint"},
+            ("M",),
+            end,
+            tag=f"link{i}",
         )
     for robot, label, hook, accept in (
         ("planar2r", "half_forgotten", lambda k, t, r, o: 2 * (t + r + o), {"half_forgotten"}),
@@ -270,7 +315,12 @@ def derivation(w):
             lambda k, t, r, o: t + 2 * r + o,
             {"rotation_half_forgotten", "inertia_doubled", "parameter_doubled"},
         ),
-        ("craig2r", "half_of_translation_forgotten", lambda k, t, r, o: 2 * t + r + o, {"translation_half_forgotten"}),
+        (
+            "craig2r",
+            "half_of_translation_forgotten",
+            lambda k, t, r, o: 2 * t + r + o,
+            {"translation_half_forgotten"},
+        ),
         (
             "telescope_mm",
             "half_of_translation_forgotten",
@@ -289,7 +339,11 @@ def derivation(w):
     for robot, qs in (("planar2r", ("M",)), ("craig2r", ("M", "h")), ("cart_double", ("M",))):
         hooks = Hooks(kinetic=lambda k, t, r, o: _no_cross(t) + r + o)
         w.derived(
-            "square_of_sum_by_squares", robot, {"velocity_cross_term", "square_without_cross_term"}, qs, hooks=hooks
+            "square_of_sum_by_squares",
+            robot,
+            {"velocity_cross_term", "square_without_cross_term"},
+            qs,
+            hooks=hooks,
         )
     for robot in (
         "planar2r",
@@ -314,7 +368,11 @@ def derivation(w):
                   hooks=Hooks(gradient=lambda i, e: -e))  # fmt: skip
     for robot in ("planar2r", "polar_rp", "rpr", "double_pendulum"):
         w.derived(
-            "mass_rate_omitted", robot, {"mass_rate_omitted"}, ("h",), hooks=Hooks(momentum_rate=lambda i, e: sp.S(0))
+            "mass_rate_omitted",
+            robot,
+            {"mass_rate_omitted"},
+            ("h",),
+            hooks=Hooks(momentum_rate=lambda i, e: sp.S(0)),
         )
     for robot in ("planar2r", "polar_rp", "stanford3", "scara3", "double_pendulum"):
         w.derived("rate_of_cosine_sign", robot, {"mass_rate_sign", "rate_of_cosine_sign", "coriolis_sign"}, ("h",) if robot != "scara3" else ("tau",),
@@ -329,19 +387,37 @@ def derivation(w):
             hooks=hooks,
         )
     factors = {
-        "coriolis_missing": (lambda i, e: _mixed(e, 0), {"coriolis_missing", "velocity_cross_term"}),
+        "coriolis_missing": (
+            lambda i, e: _mixed(e, 0),
+            {"coriolis_missing", "velocity_cross_term"},
+        ),
         "coriolis_halved": (lambda i, e: _mixed(e, sp.Rational(1, 2)), {"coriolis_halved"}),
         "coriolis_doubled": (lambda i, e: _mixed(e, 2), {"coriolis_doubled"}),
         "coriolis_sign": (lambda i, e: _mixed(e, -1), {"coriolis_sign", "mass_rate_sign"}),
-        "centrifugal_missing": (lambda i, e: _squares(e, 0), {"centrifugal_missing", "kinetic_gradient_omitted"}),
-        "centrifugal_sign": (lambda i, e: _squares(e, -1), {"centrifugal_sign", "kinetic_gradient_sign"}),
+        "centrifugal_missing": (
+            lambda i, e: _squares(e, 0),
+            {"centrifugal_missing", "kinetic_gradient_omitted"},
+        ),
+        "centrifugal_sign": (
+            lambda i, e: _squares(e, -1),
+            {"centrifugal_sign", "kinetic_gradient_sign"},
+        ),
         "centrifugal_halved": (
             lambda i, e: _squares(e, sp.Rational(1, 2)),
             {"centrifugal_halved", "kinetic_gradient_halved"},
         ),
-        "centrifugal_doubled": (lambda i, e: _squares(e, 2), {"centrifugal_doubled", "kinetic_gradient_doubled"}),
-        "h_doubled": (lambda i, e: 2 * e, {"velocity_torques_doubled", "half_forgotten", "h_doubled"}),
-        "h_halved": (lambda i, e: e / 2, {"velocity_torques_halved", "h_halved", "half_squared", "mass_rate_halved"}),
+        "centrifugal_doubled": (
+            lambda i, e: _squares(e, 2),
+            {"centrifugal_doubled", "kinetic_gradient_doubled"},
+        ),
+        "h_doubled": (
+            lambda i, e: 2 * e,
+            {"velocity_torques_doubled", "half_forgotten", "h_doubled"},
+        ),
+        "h_halved": (
+            lambda i, e: e / 2,
+            {"velocity_torques_halved", "h_halved", "half_squared", "mass_rate_halved"},
+        ),
         "h_sign": (lambda i, e: -e, {"velocity_torques_sign", "parameter_sign"}),
     }
     homes = ["planar2r", "rpr", "craig2r", "polar_rp", "cart_double", "scara3", "payload2r", "double_pendulum", "telescope_mm",
@@ -351,7 +427,13 @@ def derivation(w):
             robot = w.corpus.turn("homes", homes)
             hooks = Hooks(bias=hook)
             scale = {"entry_doubled", "entry_halved", "entry_sign"} if label[0] == "h" else set()
-            w.derived(label, robot, accept | scale, w.corpus.turn("ts2", [("h",), ("tau",), ("h", "g")]), hooks=hooks)
+            w.derived(
+                label,
+                robot,
+                accept | scale,
+                w.corpus.turn("ts2", [("h",), ("tau",), ("h", "g")]),
+                hooks=hooks,
+            )
     for robot in ("payload2r", "rpr", "planar2r", "double_pendulum"):
         w.derived("gravity_gradient_sign", robot, {"gravity_sign", "potential_gradient_sign", "parameter_sign", "entry_sign"}, ("V", "g"),
                   hooks=Hooks(gravity_gradient=lambda i, e: -e))  # fmt: skip
@@ -378,7 +460,9 @@ def _rates(term):
 
 
 def _by_term(e, kind, factor):
-    return sp.Add(*(term * (factor if kind(_rates(term)) else 1) for term in sp.Add.make_args(sp.expand(e))))
+    return sp.Add(
+        *(term * (factor if kind(_rates(term)) else 1) for term in sp.Add.make_args(sp.expand(e)))
+    )
 
 
 def _mixed(e, factor):
@@ -453,7 +537,11 @@ def parameters(w):
         "lengths_exchanged": {"parameters_exchanged", "links_exchanged"},
         "masses_exchanged": {"parameters_exchanged", "links_exchanged"},
         "inertias_exchanged": {"parameters_exchanged"},
-        "principal_moments_exchanged": {"parameters_exchanged", "inertia_axes", "inertia_axes_exchanged"},
+        "principal_moments_exchanged": {
+            "parameters_exchanged",
+            "inertia_axes",
+            "inertia_axes_exchanged",
+        },
         "drives_exchanged": {"drives_exchanged", "links_exchanged"},
         "gears_exchanged": {"parameters_exchanged", "drives_exchanged"},
         "l_for_lc": {"parameter_for_another", "com_at_end"},
@@ -474,7 +562,12 @@ def parameters(w):
     }
     for robot, change, quantities, label in swaps:
         w.derived(
-            label, robot, accept[label], quantities, substituted(R[robot], change), tag="_".join([*quantities, *change])
+            label,
+            robot,
+            accept[label],
+            quantities,
+            substituted(R[robot], change),
+            tag="_".join([*quantities, *change]),
         )
     half_way = replace(R["payload2r"], payload=0)
     half_way = derive.with_link(half_way, 2, m="m2 + mp")
@@ -497,7 +590,10 @@ def parameters(w):
             wrong = [[e.replace(old, new) if old in e else e for e in row] for row in M]
             if robot == "polar_rp":
                 wrong = [
-                    [e.replace("l1**2*m1", new) if "m1" in old else e.replace("m2*q2**2", new) for e in row]
+                    [
+                        e.replace("l1**2*m1", new) if "m1" in old else e.replace("m2*q2**2", new)
+                        for e in row
+                    ]
                     for row in M
                 ]
             w.texts(
@@ -515,7 +611,12 @@ def parameters(w):
         w.texts(
             "weight_on_vertical_axis",
             robot,
-            {"weight_on_vertical_axis", "gravity_on_vertical_axis", "gravity_axis", "gravity_axis_back"},
+            {
+                "weight_on_vertical_axis",
+                "gravity_on_vertical_axis",
+                "gravity_axis",
+                "gravity_axis_back",
+            },
             {"g": g},
         )
     level = {
@@ -530,17 +631,25 @@ def parameters(w):
                   "weight_on_vertical_axis"}, ("V",) if robot == "gantry" else ("g",), replace(R[robot], gravity=gravity))  # fmt: skip
     flat = {"beta": 0}
     tilted = replace(
-        R["incline_rp"], gravity=tuple(sp.sympify(c).subs({sp.Symbol("beta"): 0}) for c in R["incline_rp"].gravity)
+        R["incline_rp"],
+        gravity=tuple(sp.sympify(c).subs({sp.Symbol("beta"): 0}) for c in R["incline_rp"].gravity),
     )
     w.derived("tilt_forgotten", "incline_rp", {"parameter_forgotten"}, ("g",), tilted)
     back = replace(
         R["incline_rp"],
-        gravity=tuple(sp.sympify(c).subs({sp.Symbol("beta"): -sp.Symbol("beta")}) for c in R["incline_rp"].gravity),
+        gravity=tuple(
+            sp.sympify(c).subs({sp.Symbol("beta"): -sp.Symbol("beta")})
+            for c in R["incline_rp"].gravity
+        ),
     )
     w.derived("tilt_sign", "incline_rp", {"parameter_sign"}, ("g", "V"), back)
     swapped = replace(
         R["incline_rp"],
-        gravity=(sp.Symbol("g") * sp.cos(sp.Symbol("beta")), -sp.Symbol("g") * sp.sin(sp.Symbol("beta")), 0),
+        gravity=(
+            sp.Symbol("g") * sp.cos(sp.Symbol("beta")),
+            -sp.Symbol("g") * sp.sin(sp.Symbol("beta")),
+            0,
+        ),
     )
     w.derived(
         "tilt_sin_cos",
@@ -559,7 +668,11 @@ def conventions(w):
         other = replace(R[robot], modified=not R[robot].modified)
         w.derived("table_of_other_convention", robot, {"convention_exchanged", "other_convention", "dynamics_other_convention"},
                   ("M", "g") if robot != "stanford3" else ("g",), other)  # fmt: skip
-    for robot, i, quantities in (("stanford3", 2, ("g",)), ("puma3", 3, ("g",)), ("rpr", 2, ("g",))):
+    for robot, i, quantities in (
+        ("stanford3", 2, ("g",)),
+        ("puma3", 3, ("g",)),
+        ("rpr", 2, ("g",)),
+    ):
         one = R[robot].links[i - 1]
         w.derived(
             "alpha_sign",
@@ -574,7 +687,12 @@ def conventions(w):
         w.texts(
             "absolute_not_declared",
             robot,
-            {"absolute_angles", "angles_absolute", "height_relative_angle", "angles_declared_relative"},
+            {
+                "absolute_angles",
+                "angles_absolute",
+                "height_relative_angle",
+                "angles_declared_relative",
+            },
             answers,
         )
         relative = {q: applied("by_mass", truth(robot)[q]) for q in ("M", "g")}
@@ -593,13 +711,21 @@ def conventions(w):
         {"g": ["9.81*(4*200 + 2*(q2 + 100))*cos(q1)", "2*9.81*sin(q1)"]},
         tag="g",
     )
-    w.texts("millimetres", "pan_tilt", {"millimetres_for_metres"}, {"g": ["0", "0.25*9.81*25*cos(q2)"]}, tag="g")
+    w.texts(
+        "millimetres",
+        "pan_tilt",
+        {"millimetres_for_metres"},
+        {"g": ["0", "0.25*9.81*25*cos(q2)"]},
+        tag="g",
+    )
     w.texts("offset_of_slide_forgotten", "telescope_mm", {"d_forgotten", "offset_forgotten", "parameter_forgotten", "length_forgotten"},
             {"M": [["4*0.2**2 + 0.06 + 0.015 + 2*(q2 - 0.05)**2", "0"], ["0", "2"]]})  # fmt: skip
     w.texts("com_of_slide_forgotten", "telescope_mm", {"com_at_end", "com_forgotten"},
             {"M": [["4*0.2**2 + 0.06 + 0.015 + 2*(q2 + 0.15)**2", "0"], ["0", "2"]], "g": ["9.81*(4*0.2 + 2*(q2 + 0.15))*cos(q1)", "2*9.81*sin(q1)"]})  # fmt: skip
     for robot in ("planar2r", "double_pendulum", "pendulum1"):
-        g = [re.sub(r"(sin|cos)\(([^()]*)\)", r"\1((\2)*pi/180)", str(e)) for e in truth(robot)["g"]]
+        g = [
+            re.sub(r"(sin|cos)\(([^()]*)\)", r"\1((\2)*pi/180)", str(e)) for e in truth(robot)["g"]
+        ]
         w.texts("degrees", robot, {"degrees_for_radians"}, {"g": g})
     friction = {"planar2r": 1, "geared2r": 1, "pendulum1": 1, "polar_rp": 1}
     for robot in friction:
@@ -609,12 +735,21 @@ def conventions(w):
         reference = {"tau": right}
         how = {"reference": reference, "task": {"friction": True}}
         w.texts("friction_sign", robot, {"friction_sign", "parameter_sign"}, {"tau": minus}, **how)
-        w.texts("friction_missing", robot, {"friction_forgotten", "parameter_forgotten"}, {"tau": known["tau"]}, **how)
+        w.texts(
+            "friction_missing",
+            robot,
+            {"friction_forgotten", "parameter_forgotten"},
+            {"tau": known["tau"]},
+            **how,
+        )
         w.corpus.right(f"friction_{robot}", robot, {"tau": right}, w.corpus.turn("wrongnotation", NOTATION), reference=reference,
                        task={"friction": True})  # fmt: skip
     known = truth("geared2r")
     N1, N2, b1, b2 = sp.symbols("N1 N2 b1 b2")
-    motor_side = [sp.expand(t + b * qd) for t, b, qd in zip(known["tau"], (b1, b2), (qd_(1), qd_(2)), strict=True)]
+    motor_side = [
+        sp.expand(t + b * qd)
+        for t, b, qd in zip(known["tau"], (b1, b2), (qd_(1), qd_(2)), strict=True)
+    ]
     right = [sp.expand(a + b) for a, b in zip(known["tau"], known["friction"], strict=True)]
     w.texts("friction_without_gear", "geared2r", {"friction_without_gear", "friction_gear"}, {"tau": motor_side},
             reference={"tau": right}, task={"friction": True})  # fmt: skip
@@ -674,7 +809,9 @@ def writing(w):
         else:
             value[at[0]] = new
         index = "".join(str(i + 1) for i in at)
-        w.texts(f"term_{change}", robot, SLIPS[change], {quantity: value}, tag=f"{quantity}{index}_{k}")
+        w.texts(
+            f"term_{change}", robot, SLIPS[change], {quantity: value}, tag=f"{quantity}{index}_{k}"
+        )
     trigonometry(w)
     rates_and_sums(w)
 
@@ -702,7 +839,14 @@ SLIPS = {
         "gravity_sign",
         "length_sign",
     },
-    "double": {"term_doubled", "term_factor", "parameter_doubled", "coriolis_doubled", "entry_doubled", "term_twice"},
+    "double": {
+        "term_doubled",
+        "term_factor",
+        "parameter_doubled",
+        "coriolis_doubled",
+        "entry_doubled",
+        "term_twice",
+    },
     "half": {"term_halved", "term_factor", "parameter_halved", "coriolis_halved", "entry_halved"},
     "sine": {
         "term_function",
@@ -748,7 +892,9 @@ def _slip(parts, k, change):
     swap = {"index": ("qd1", "qd2"), "mass": ("m1", "m2"), "length": ("l1", "l2")}[change]
     turn = {swap[0]: swap[1], swap[1]: swap[0]}
     if not any(f"'{one}'" in text for one in swap):
-        turn = {"index": {"qd3": "qd2"}, "mass": {"m3": "m2", "mp": "m2"}, "length": {"l3": "l2"}}[change]
+        turn = {"index": {"qd3": "qd2"}, "mass": {"m3": "m2", "mp": "m2"}, "length": {"l3": "l2"}}[
+            change
+        ]
     new = re.sub(r"'(\w+)'", lambda m: f"'{turn.get(m[1], m[1])}'", text)
     assert new != text, text
     return [*parts[:k], (sign, eval(new)), *parts[k + 1 :]]
@@ -767,7 +913,13 @@ def trigonometry(w):
         ),
         "cosine_of_sum_mixed": (
             "(sin(q1)*cos(q2) + cos(q1)*sin(q2))",
-            {"sine_for_cosine", "sin_cos_exchanged", "zero_shifted", "zero_shifted_back", "addition_formula"},
+            {
+                "sine_for_cosine",
+                "sin_cos_exchanged",
+                "zero_shifted",
+                "zero_shifted_back",
+                "addition_formula",
+            },
         ),
         "cosine_of_difference": (
             "cos(q1 - q2)",
@@ -782,10 +934,23 @@ def trigonometry(w):
             g = [str(e).replace("cos(q1 + q2)", new) for e in truth(robot)["g"]]
             w.texts(label, robot, accept, {"g": g})
     for robot in ("double_pendulum",):
-        g = [str(e).replace("sin(q1 + q2)", "(sin(q1)*cos(q2) - cos(q1)*sin(q2))") for e in truth(robot)["g"]]
-        w.texts("sine_of_sum_sign", robot, {"addition_sign", "sine_of_sum_sign", "sine_of_difference"}, {"g": g})
+        g = [
+            str(e).replace("sin(q1 + q2)", "(sin(q1)*cos(q2) - cos(q1)*sin(q2))")
+            for e in truth(robot)["g"]
+        ]
+        w.texts(
+            "sine_of_sum_sign",
+            robot,
+            {"addition_sign", "sine_of_sum_sign", "sine_of_difference"},
+            {"g": g},
+        )
         g = [str(e).replace("sin(q1 + q2)", "(sin(q1) + sin(q2))") for e in truth(robot)["g"]]
-        w.texts("sine_of_sum_by_sum", robot, {"sine_of_sum", "sum_of_sines", "addition_linear"}, {"g": g})
+        w.texts(
+            "sine_of_sum_by_sum",
+            robot,
+            {"sine_of_sum", "sum_of_sines", "addition_linear"},
+            {"g": g},
+        )
 
 
 def rates_and_sums(w):
@@ -803,7 +968,10 @@ def rates_and_sums(w):
             ["1/2*m2*l1*l2*s2*qd1", "0"],
         ],
         ("polar_rp", "c11_wrong_rate"): [["m2*q2*qd1", "m2*q2*qd1"], ["-m2*q2*qd1", "0"]],
-        ("craig2r", "c12_lacks_rate"): [["-m2*l1*r2*s2*qd2", "-m2*l1*r2*s2*qd2"], ["m2*l1*r2*s2*qd1", "0"]],
+        ("craig2r", "c12_lacks_rate"): [
+            ["-m2*l1*r2*s2*qd2", "-m2*l1*r2*s2*qd2"],
+            ["m2*l1*r2*s2*qd1", "0"],
+        ],
         ("double_pendulum", "c_transposed"): [
             ["-m2*l1*l2*s2*qd2", "m2*l1*l2*s2*qd1"],
             ["-m2*l1*l2*s2*(qd1 + qd2)", "0"],
@@ -826,13 +994,30 @@ def rates_and_sums(w):
     for robot in ("planar2r", "rpr"):
         M = [list(row) for row in truth(robot)["M"]]
         M[1][0] = 0
-        w.texts("mirror_entry_zero", robot, {"mass_matrix_not_symmetric", "term_missing"}, {"M": M}, layout="toml")
+        w.texts(
+            "mirror_entry_zero",
+            robot,
+            {"mass_matrix_not_symmetric", "term_missing"},
+            {"M": M},
+            layout="toml",
+        )
     for robot in ("payload2r", "craig2r"):
         h = list(truth(robot)["h"])
         w.texts("rows_exchanged", robot, {"equations_exchanged"}, {"h": h[::-1]})
-        w.texts("rows_exchanged", robot, {"equations_exchanged"}, {"tau": truth(robot)["tau"][::-1]}, tag="tau")
+        w.texts(
+            "rows_exchanged",
+            robot,
+            {"equations_exchanged"},
+            {"tau": truth(robot)["tau"][::-1]},
+            tag="tau",
+        )
     for robot in ("double_pendulum", "rpr"):
-        w.texts("lagrangian_sum", robot, {"lagrangian_sum"}, {"L": sp.expand(truth(robot)["K"] + truth(robot)["V"])})
+        w.texts(
+            "lagrangian_sum",
+            robot,
+            {"lagrangian_sum"},
+            {"L": sp.expand(truth(robot)["K"] + truth(robot)["V"])},
+        )
     for robot in ("pendulum1", "gantry"):
         w.texts(
             "inertia_over",
@@ -864,7 +1049,14 @@ def kinematic(w):
         ("puma3", 2, 3, "0", "alpha_forgotten", {"alpha_forgotten", "wrong_twist"}),
         ("scara3", 1, 3, "0", "alpha_forgotten", {"alpha_forgotten", "wrong_twist"}),
         ("scara3", 1, 0, "q1", "variable_of_another", {"variable_of_another_joint"}),
-        ("telescope_mm", 1, 1, "q2 + 150", "millimetres", {"millimetres_for_metres", "wrong_length"}),
+        (
+            "telescope_mm",
+            1,
+            1,
+            "q2 + 150",
+            "millimetres",
+            {"millimetres_for_metres", "wrong_length"},
+        ),
         ("pan_tilt", 0, 1, "80", "millimetres", {"millimetres_for_metres", "wrong_length"}),
         ("pan_tilt", 0, 3, "90", "degrees", {"degrees_for_radians", "wrong_twist"}),
         ("polar_rp", 0, 3, "90", "degrees", {"degrees_for_radians", "wrong_twist"}),
@@ -883,7 +1075,14 @@ def kinematic(w):
     for robot in ("craig2r", "stanford3", "polar_rp"):
         convention, rows = TABLES[robot]
         other = {"standard": "modified", "modified": "standard"}[convention]
-        _table(w, "other_convention_declared", robot, other, rows, {"other_convention", "convention_exchanged"})
+        _table(
+            w,
+            "other_convention_declared",
+            robot,
+            other,
+            rows,
+            {"other_convention", "convention_exchanged"},
+        )
     jacobians(w)
     for robot in ("scara3", "stanford3", "rpr"):
         A = derive.row_transforms(ROBOTS[robot])
@@ -923,11 +1122,15 @@ def _frames_differ(robot, convention, rows):
         turn = {f"q{i + 1}": sp.Symbol(f"q{i + 1}") for i in range(known.n)}
         theta, d, a, alpha = (sp.sympify(e, locals=turn) for e in row)
         links.append(replace(one, kind="fixed", theta=theta, d=d, a=a, alpha=alpha))
-    changed = derive.row_transforms(replace(known, links=tuple(links), modified=convention == "modified"))
+    changed = derive.row_transforms(
+        replace(known, links=tuple(links), modified=convention == "modified")
+    )
     right = derive.row_transforms(known)
     state = {
         s: sp.Rational(3 * k + 7, 10)
-        for k, s in enumerate(sorted({s for A in [*changed, *right] for s in A.free_symbols}, key=str))
+        for k, s in enumerate(
+            sorted({s for A in [*changed, *right] for s in A.free_symbols}, key=str)
+        )
     }
     poses = []
     for product in (changed, right):
@@ -956,7 +1159,10 @@ def jacobians(w):
         kinds = [one.kind for one in ROBOTS[robot].links]
         lever = [F[k][:3, 2].cross(p) if kinds[k] == "R" else F[k][:3, 2] for k in range(n)]
         whole = _columns(lever, [J[3:, k] for k in range(n)])
-        crossed = _columns([-J[:3, k] if kinds[k] == "R" else J[:3, k] for k in range(n)], [J[3:, k] for k in range(n)])
+        crossed = _columns(
+            [-J[:3, k] if kinds[k] == "R" else J[:3, k] for k in range(n)],
+            [J[3:, k] for k in range(n)],
+        )
         neighbour = _columns([F[k + 1][:3, 2].cross(p - F[k][:3, 3]) if kinds[k] == "R" else F[k + 1][:3, 2] for k in range(n)],
                              [F[k + 1][:3, 2] if kinds[k] == "R" else sp.zeros(3, 1) for k in range(n)])  # fmt: skip
         angular = _columns([J[:3, k] for k in range(n)], [F[k][:3, 2] for k in range(n)])

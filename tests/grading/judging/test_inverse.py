@@ -85,7 +85,9 @@ ARMS = {
 
 def judge(robot, branches, **options):
     description = library_robot(robot) if isinstance(robot, str) else robot
-    return judge_inverse(description, [[read(formula) for formula in branch] for branch in branches], **options)
+    return judge_inverse(
+        description, [[read(formula) for formula in branch] for branch in branches], **options
+    )
 
 
 def wrong(robot, joint, formula, branch=0):
@@ -101,7 +103,9 @@ def mistakes(judged, branch=0):
     for one in judged.diagnosis:
         place = one.where.split(", ")
         if place[1] == f"branch {branch + 1}":
-            found.append((one.mistake, int(place[2].removeprefix("q")) - 1 if len(place) > 2 else None))
+            found.append(
+                (one.mistake, int(place[2].removeprefix("q")) - 1 if len(place) > 2 else None)
+            )
     return found
 
 
@@ -123,7 +127,9 @@ def test_fewer_branches_are_said():
 
 
 def test_positions_alone_are_asked_of_an_arm_of_two_joints():
-    assert judge("planar2r", ARMS["planar2r"]).notes == (Note(NoteKind.ASKED_FOR, "ik", ("x", "y", "z")),)
+    assert judge("planar2r", ARMS["planar2r"]).notes == (
+        Note(NoteKind.ASKED_FOR, "ik", ("x", "y", "z")),
+    )
 
 
 @pytest.mark.parametrize(
@@ -185,7 +191,11 @@ ELBOW = "acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))"
 SHOULDER = "atan2(py, px) - atan2(l2*sin(q2), l1 + l2*cos(q2))"
 RPR = from_dh([("pi/2", 0, 0, "pi/2"), (0, 0, 0, "-pi/2"), ("-pi/2", 0, 0.3, 0)], kinds="RPR")
 """Swing, telescope and hand in a plane: no closed form of ours."""
-RPR_RIGHT = ["atan2(py - 0.3*r21, px - 0.3*r11)", "sqrt((px - 0.3*r11)^2 + (py - 0.3*r21)^2)", "atan2(r21, r11) - q1"]
+RPR_RIGHT = [
+    "atan2(py - 0.3*r21, px - 0.3*r11)",
+    "sqrt((px - 0.3*r11)^2 + (py - 0.3*r21)^2)",
+    "atan2(r21, r11) - q1",
+]
 RRP = from_dh([(0, 0.4, 0, "-pi/2"), (0, 0.15, 0, "pi/2"), (0, 0, 0, 0)], kinds="RRP")
 """The first three joints of a Stanford arm: no closed form of ours."""
 RADIUS = "px^2 + py^2 - 0.15^2"
@@ -194,7 +204,9 @@ RRP_RIGHT = [
     "atan2(px*cos(q1) + py*sin(q1), pz - 0.4)",
     f"sqrt({RADIUS} + (pz - 0.4)^2)",
 ]
-GANTRY = with_base(from_dh([(0, 0, 0, "pi/2"), (0, 0, 0, 0)], kinds="PP"), pose(euler=(-np.pi / 2, 0, 0)))
+GANTRY = with_base(
+    from_dh([(0, 0, 0, "pi/2"), (0, 0, 0, 0)], kinds="PP"), pose(euler=(-np.pi / 2, 0, 0))
+)
 PUMA3 = from_dh([(0, 0.6, 0, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)])
 HEIGHT = "((px^2 + py^2 + (pz - 0.6)^2 - 0.4^2 - 0.3^2)/(2*0.4*0.3))"
 PUMA3_RIGHT = [
@@ -253,8 +265,20 @@ def test_the_formulas_that_mistakes_are_made_in_are_right(name):
         ("gantry", 0, "py", "px", "axis_exchanged"),
         ("cobra600", 2, "pz", "py", "axis_exchanged"),
         ("rrp", 2, "(pz - 0.4)", "(px - 0.4)", "axis_exchanged"),
-        ("planar2r", 0, "l2*sin(q2), l1 + l2*cos(q2)", "l1*sin(q2), l2 + l1*cos(q2)", "lengths_exchanged"),
-        ("puma3", 1, "0.3*sin(q3), 0.4 + 0.3*cos(q3)", "0.4*sin(q3), 0.3 + 0.4*cos(q3)", "lengths_exchanged"),
+        (
+            "planar2r",
+            0,
+            "l2*sin(q2), l1 + l2*cos(q2)",
+            "l1*sin(q2), l2 + l1*cos(q2)",
+            "lengths_exchanged",
+        ),
+        (
+            "puma3",
+            1,
+            "0.3*sin(q3), 0.4 + 0.3*cos(q3)",
+            "0.4*sin(q3), 0.3 + 0.4*cos(q3)",
+            "lengths_exchanged",
+        ),
         ("pan_tilt", 1, "pz - 0.08", "pz", "offset_forgotten"),
         ("pan_tilt", 1, "pz - 0.08", "pz + 0.08", "term_sign"),
         ("rrp", 1, "pz - 0.4", "pz", "offset_forgotten"),
@@ -325,7 +349,10 @@ def test_a_right_formula_is_never_blamed(name):
 def test_an_arm_without_a_closed_form_is_asked_for_what_determines_its_joints():
     judged = judge(RRP, [RRP_RIGHT])
     assert judged.verdict is CORRECT
-    assert judged.notes == (Note(NoteKind.POSITIONS_ONLY, "ik"), Note(NoteKind.NO_CLOSED_FORM, "ik"))
+    assert judged.notes == (
+        Note(NoteKind.POSITIONS_ONLY, "ik"),
+        Note(NoteKind.NO_CLOSED_FORM, "ik"),
+    )
     planar = judge(RPR, [RPR_RIGHT])  # the position leaves the hand's angle open
     assert planar.notes == (Note(NoteKind.NO_CLOSED_FORM, "ik"),)
     assert judge(RPR, [[*RPR_RIGHT[:2], "0"]]).verdict is WRONG
@@ -346,12 +373,18 @@ def test_verdicts_do_not_depend_on_the_seed(name):
 @pytest.mark.slow
 def test_several_mistakes_of_a_branch_are_all_named():
     formulas = ["atan(py/px)", "sqrt(px^2 + py^2)*1000"]
-    assert mistakes(judge("polar_rp", [formulas])) == [("quadrant", 0), ("millimetres_for_metres", 1)]
+    assert mistakes(judge("polar_rp", [formulas])) == [
+        ("quadrant", 0),
+        ("millimetres_for_metres", 1),
+    ]
     formulas = ["acos(px/sqrt(px^2 + py^2))", "px^2 + py^2"]
     assert mistakes(judge("polar_rp", [formulas])) == [("sign_lost", 0), ("root_forgotten", 1)]
     puma = list(ARMS["puma560_cao"][0])
     puma[0], puma[5] = f"{puma[0]} + pi/3", f"({puma[5]})/deg"
-    assert mistakes(judge("puma560_cao", [puma])) == [("missing_offset", 0), ("degrees_for_radians", 5)]
+    assert mistakes(judge("puma560_cao", [puma])) == [
+        ("missing_offset", 0),
+        ("degrees_for_radians", 5),
+    ]
 
 
 def test_what_has_no_name_has_a_place():
@@ -431,7 +464,12 @@ def test_duplicates():
 def test_base_and_tool_are_in_the_pose():
     arm = with_tool(with_base(library_robot("planar2r"), pose((0.1, 0.2, 0))), pose((0.1, 0, 0)))
     moved = [
-        [formula.replace("px", "(px - 0.1)").replace("py", "(py - 0.2)").replace("l2", "(l2 + 0.1)") for formula in b]
+        [
+            formula.replace("px", "(px - 0.1)")
+            .replace("py", "(py - 0.2)")
+            .replace("l2", "(l2 + 0.1)")
+            for formula in b
+        ]
         for b in ARMS["planar2r"]
     ]
     assert judge(arm, moved).verdict is CORRECT
@@ -503,8 +541,12 @@ def test_the_search_for_mistakes_is_bounded():
 @pytest.mark.slow
 def test_mistakes_that_all_branches_share_are_named_in_each(law):
     """Eight branches with a mistake in each of five formulas: 40 mistakes, in seconds."""
-    wrong = [[formula.replace("sin", "cos", 1) for formula in branch] for branch in ARMS["puma560_cao"]]
+    wrong = [
+        [formula.replace("sin", "cos", 1) for formula in branch] for branch in ARMS["puma560_cao"]
+    ]
     start = time.process_time()
     named = [(one.where, one.mistake) for one in judge("puma560_cao", wrong).diagnosis]
     law.takes("time of a diagnosis, s", time.process_time() - start, 3.0)
-    assert named == [(f"ik, branch {b}, q{j}", "term_function") for b in range(1, 9) for j in range(2, 7)]
+    assert named == [
+        (f"ik, branch {b}, q{j}", "term_function") for b in range(1, 9) for j in range(2, 7)
+    ]

@@ -23,7 +23,11 @@ class Cosine(sympy.Function):
 def planar(lengths, cosine=cos):
     angles = [q1, q1 + q2, q1 + q2 + q3]
     pairs = list(zip(lengths, angles, strict=False))
-    return [sum(a * cosine(x) for a, x in pairs), sum(a * sin(x) for a, x in pairs), sympy.Integer(0)]
+    return [
+        sum(a * cosine(x) for a, x in pairs),
+        sum(a * sin(x) for a, x in pairs),
+        sympy.Integer(0),
+    ]
 
 
 def elbow(cosine=cos):
@@ -157,4 +161,6 @@ def test_the_four_rows_of_a_scara():
     ]
     assert arm.grade({"J": right}).verdict.passes
     wrong = [*right[:2], ["0", "0", "1", "0"], right[3]]
-    assert [entry.name for entry in arm.grade({"J": wrong}).entries if not entry.verdict.passes] == ["J33"]
+    assert [
+        entry.name for entry in arm.grade({"J": wrong}).entries if not entry.verdict.passes
+    ] == ["J33"]

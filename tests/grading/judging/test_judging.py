@@ -44,7 +44,11 @@ def ring():
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("sin(q1)^2 + cos(q1)^2", "1"), ("(1 + l1)/(1 + l1)", "1"), ("sin(3*q1)", "3*sin(q1) - 4*sin(q1)^3")],
+    [
+        ("sin(q1)^2 + cos(q1)^2", "1"),
+        ("(1 + l1)/(1 + l1)", "1"),
+        ("sin(3*q1)", "3*sin(q1) - 4*sin(q1)^3"),
+    ],
 )
 def test_equal_texts_are_one_quotient(text, value):
     reader = RingReader(ring())
@@ -84,7 +88,11 @@ def test_a_sample_gives_an_element_and_its_text_one_value():
 
 @pytest.mark.parametrize(
     ("text", "verdict"),
-    [("l1*cos(q1)", Verdict.CORRECT), ("l1*sin(q1)", Verdict.WRONG), ("l1*sqrt(1 - sin(q1)^2)", Verdict.WRONG)],
+    [
+        ("l1*cos(q1)", Verdict.CORRECT),
+        ("l1*sin(q1)", Verdict.WRONG),
+        ("l1*sqrt(1 - sin(q1)^2)", Verdict.WRONG),
+    ],
 )
 def test_a_wrong_entry_has_a_witness(text, verdict):
     arm = exact_arm(ARM, "file")
@@ -97,12 +105,15 @@ def test_a_wrong_entry_has_a_witness(text, verdict):
 
 
 @pytest.mark.parametrize(
-    ("text", "passes"), [("0.3333*l1", True), ("0.3335*l1", False), ("0.3333*l1 + 0.00001*l2", False)]
+    ("text", "passes"),
+    [("0.3333*l1", True), ("0.3335*l1", False), ("0.3333*l1 + 0.00001*l2", False)],
 )
 def test_rounding_is_judged_coefficient_by_coefficient(text, passes):
     reader = RingReader(ring())
     truth = reader.read(read("l1/3")).element()
-    share = rounding_share(read(text), truth, reader, lambda answer, x: [answer.numerator_of_difference(x)], 4)
+    share = rounding_share(
+        read(text), truth, reader, lambda answer, x: [answer.numerator_of_difference(x)], 4
+    )
     assert (share is not None) == passes
 
 
@@ -132,8 +143,14 @@ def test_parts_of_formulas_are_replaced():
     names = {"px": read("py"), "py": read("px")}
     values = {"px": 0.2, "py": 0.7, "q1": 1.0}
     swapped = changed_formulas.renamed(tree, names)
-    turned = changed_formulas.with_calls_changed(tree, ("atan2",), changed_formulas.exchange_arguments)
-    assert doubles(swapped, values) == doubles(turned, values) == pytest.approx(np.arctan2(0.2, 0.7) + 1)
+    turned = changed_formulas.with_calls_changed(
+        tree, ("atan2",), changed_formulas.exchange_arguments
+    )
+    assert (
+        doubles(swapped, values)
+        == doubles(turned, values)
+        == pytest.approx(np.arctan2(0.2, 0.7) + 1)
+    )
     assert changed_formulas.renamed(tree, {}) is tree
 
 
@@ -153,9 +170,15 @@ def test_an_arm_is_itself_and_other_frames_are_named():
     entries = np.array([[0.0, 0.0, 0.5, 0.0], [0.0, 0.0, 0.4, 0.0]])
     truth = TableArm(Convention.STANDARD, "RR", entries, np.ones(2))
     assert overlaid(truth, truth, strict=True).changes == ()
-    other = TableArm(Convention.STANDARD, "RR", entries + np.array([[0, 0.1, 0, 0], [0, -0.1, 0, 0]]), np.ones(2))
-    assert {change.change for change in overlaid(other, truth, strict=True).changes} == {Change.FRAME_SLID}
-    longer = TableArm(Convention.STANDARD, "RR", entries + np.array([[0, 0, 0.1, 0], [0, 0, 0, 0]]), np.ones(2))
+    other = TableArm(
+        Convention.STANDARD, "RR", entries + np.array([[0, 0.1, 0, 0], [0, -0.1, 0, 0]]), np.ones(2)
+    )
+    assert {change.change for change in overlaid(other, truth, strict=True).changes} == {
+        Change.FRAME_SLID
+    }
+    longer = TableArm(
+        Convention.STANDARD, "RR", entries + np.array([[0, 0, 0.1, 0], [0, 0, 0, 0]]), np.ones(2)
+    )
     assert overlaid(longer, truth, strict=True) is None
 
 
@@ -172,7 +195,9 @@ def test_changes_of_frames_and_joints():
 
 
 def test_a_row_is_proved_or_differs():
-    trees = [[read(entry) for entry in row] for row in (("q1", "0", "l1", "0"), ("q2", "0", "l1", "0"))]
+    trees = [
+        [read(entry) for entry in row] for row in (("q1", "0", "l1", "0"), ("q2", "0", "l1", "0"))
+    ]
     table = TableRows(ARM, Answer.of(ARM, trees), ARM.convention)
     assert [table.row(i).verdict for i in range(2)] == [Verdict.CORRECT, Verdict.WRONG]
     assert other_convention(other_convention(ARM.convention)) is ARM.convention
@@ -184,12 +209,16 @@ def test_a_wrong_quadrant_is_found_and_put_right():
     wrong = right.with_tree(0, read("atan2(px, py)"))
     assert right.is_right
     assert not wrong.is_right
-    assert [found.mistake for found in MistakeSearch(POLAR).explanations(wrong)] == ["atan2_arguments"]
+    assert [found.mistake for found in MistakeSearch(POLAR).explanations(wrong)] == [
+        "atan2_arguments"
+    ]
     assert joint_order([read("q2"), read("px")]) == (1, 0)
 
 
 def test_edits_come_in_their_order():
-    found = edits(read("acos((px^2 + py^2 - l1^2)/(2*l1))"), True, (), (), Lengths(("l1",), (read("l1"),)))
+    found = edits(
+        read("acos((px^2 + py^2 - l1^2)/(2*l1))"), True, (), (), Lengths(("l1",), (read("l1"),))
+    )
     ranks = [ORDER.index(edit.mistake) for edit in found]
     assert ranks == sorted(ranks)
     assert {"elbow_sign", "cosine_law_sign", "joint_sign"} <= {edit.mistake for edit in found}
@@ -205,4 +234,6 @@ def test_work_in_a_process_of_its_own_ends():
 
 
 def test_fractions_of_numbers_are_exact():
-    assert truth_of(ARM).reader("M").read(read("1/3")).element().terms.popitem()[1] == Fraction(1, 3)
+    assert truth_of(ARM).reader("M").read(read("1/3")).element().terms.popitem()[1] == Fraction(
+        1, 3
+    )

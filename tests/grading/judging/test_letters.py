@@ -53,7 +53,12 @@ def test_an_answer_that_lacks_a_letter_is_not_right(law):
             entries[i] = wrong
         report = arm.grade({quantity: entries}, explain=False)
         passes = [entry.verdict.passes for entry in report.entries if entry.index == place]
-        law.holds("answers without a letter that pass", sum(passes), 0, (wrong, dict(arm.description.parameters)))
+        law.holds(
+            "answers without a letter that pass",
+            sum(passes),
+            0,
+            (wrong, dict(arm.description.parameters)),
+        )
 
 
 def test_numbers_may_stand_where_they_are_written():
@@ -67,7 +72,10 @@ def test_numbers_may_stand_where_they_are_written():
 def test_a_sheet_without_letters_is_judged_at_the_values_of_the_file():
     arm = Arm.load("planar2r")
     values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}
-    g = [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in written(arm.lagrangian.g)]
+    g = [
+        LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry)
+        for entry in written(arm.lagrangian.g)
+    ]
     report = arm.grade({"g": g})
     assert report.verdict.passes
     assert "judged at" in str(report)
@@ -87,7 +95,10 @@ def test_a_letter_of_the_same_value_is_another_letter(pair):
 def test_a_task_may_ask_for_letters():
     arm = Arm.load("planar2r")
     values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}
-    g = [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in written(arm.lagrangian.g)]
+    g = [
+        LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry)
+        for entry in written(arm.lagrangian.g)
+    ]
     report = arm.grade({"g": g}, task={"values": False})
     assert report.verdict.value == "incomplete"
     assert all("the task asks for letters" in entry.statement for entry in report.entries)
@@ -109,7 +120,11 @@ INVERSE = {
     "a length left out": (RIGHT.replace("2*l1*l2", "2*l2"), FIRST, False),
     "lengths exchanged": (RIGHT, "atan2(py, px) - atan2(l1*sin(q2), l2 + l1*cos(q2))", False),
     "a length not squared": (RIGHT.replace("l1^2", "l1"), FIRST, False),
-    "numbers": (RIGHT.replace("l1", "1").replace("l2", "1"), "atan2(py, px) - atan2(sin(q2), 1 + cos(q2))", True),
+    "numbers": (
+        RIGHT.replace("l1", "1").replace("l2", "1"),
+        "atan2(py, px) - atan2(sin(q2), 1 + cos(q2))",
+        True,
+    ),
 }
 
 
@@ -134,14 +149,31 @@ BOTH = "atan2(py,px)-atan2({l2}*s2,{l1}+{l2}*c2)"
     [
         ("l1^2-l2^2", "2*l1*l2", BOTH.format(l1="l1", l2="l2"), ["correct", "correct"], {}),
         ("0.41", "0.4", BOTH.format(l1="0.5", l2="0.4"), ["correct", "correct"], PLANAR),
-        ("0.25-l2^2", "2*0.5*l2", BOTH.format(l1="0.5", l2="l2"), ["correct", "correct"], {"l1": 0.5}),
-        ("0.25-l2^2", "1.0*l2", BOTH.format(l1="0.5", l2="l2"), ["correct", "correct"], {"l1": 0.5}),
+        (
+            "0.25-l2^2",
+            "2*0.5*l2",
+            BOTH.format(l1="0.5", l2="l2"),
+            ["correct", "correct"],
+            {"l1": 0.5},
+        ),
+        (
+            "0.25-l2^2",
+            "1.0*l2",
+            BOTH.format(l1="0.5", l2="l2"),
+            ["correct", "correct"],
+            {"l1": 0.5},
+        ),
         ("0.25-l2^2", "l2", BOTH.format(l1="0.5", l2="l2"), ["wrong", "correct"], {"l1": 0.5}),
         ("l1^2-l2^2", "l2", BOTH.format(l1="l1", l2="l2"), ["wrong", "correct"], {}),
     ],
 )
-def test_numbers_in_inverse_kinematics_stand_where_they_are_written(squares, product, shoulder, verdicts, at_values):
-    steps = [{"joint": 2, "solution": ACOS.format(squares, product)}, {"joint": 1, "solution": shoulder}]
+def test_numbers_in_inverse_kinematics_stand_where_they_are_written(
+    squares, product, shoulder, verdicts, at_values
+):
+    steps = [
+        {"joint": 2, "solution": ACOS.format(squares, product)},
+        {"joint": 1, "solution": shoulder},
+    ]
     arm = Arm.load("planar2r")
     report = arm.grade({"ik": {"steps": steps}}, explain=False)
     assert [entry.verdict.value for entry in report.entries] == verdicts
@@ -158,7 +190,9 @@ def test_numbers_in_inverse_kinematics_stand_where_they_are_written(squares, pro
         ((0.4, 0.4), "2*a1^2", "2*a1*a2", ("a2", "a1")),
     ],
 )
-def test_lengths_of_the_table_are_letters_in_inverse_kinematics(lengths, squares, product, shoulder):
+def test_lengths_of_the_table_are_letters_in_inverse_kinematics(
+    lengths, squares, product, shoulder
+):
     arm = Arm.from_dh([(0, 0, length, 0) for length in lengths])
     first, second = shoulder
     wrong = [
@@ -181,7 +215,13 @@ def test_lengths_of_the_table_are_letters_in_inverse_kinematics(lengths, squares
         ({}, {"h": ["-m2*l2*s2*(qd1*qd2 + qd2^2/2)/2", "m2*l2*s2*qd1^2/4"]}),
         ({"l2": 2.0}, {"V": "m1*g*l1/2*s1+m2*g*(l1*s1+s12)"}),
         ({"l2": 2.0}, {"C": [["-m2*l1*s2*qd2", "-m2*l1*s2*(qd1+qd2)"], ["m2*l1*s2*qd1", "0"]]}),
-        ({"m2": 3.0}, {"M": [["m1*l1^2/3+m2*(l1^2+l2^2/3+l1*l2*c2)", "m2*l2*(l2/3+l1*c2/2)"]] * 1 + [["0", "l2^2"]]}),
+        (
+            {"m2": 3.0},
+            {
+                "M": [["m1*l1^2/3+m2*(l1^2+l2^2/3+l1*l2*c2)", "m2*l2*(l2/3+l1*c2/2)"]] * 1
+                + [["0", "l2^2"]]
+            },
+        ),
         ({"l2": 2.0}, {"g": ["m1*g*l1*c1/2+m2*g*(l1*c1+c12)", "m2*g*(2*cos((q1+q2)/2)^2-1)"]}),
     ],
 )
@@ -221,7 +261,8 @@ def test_a_christoffel_c_in_numbers_is_called_that():
     arm = Arm.load("planar2r")
     values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}
     C = [
-        [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in row] for row in written(arm.lagrangian.C)
+        [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in row]
+        for row in written(arm.lagrangian.C)
     ]
     kinds = [note.kind for note in arm.grade({"C": C}).notes]
     assert NoteKind.CHRISTOFFEL in kinds and NoteKind.NOT_SKEW not in kinds

@@ -10,13 +10,21 @@ from dhkit.symbolic import lagrangian
 from grading_answers import corpus_robot
 
 ROBOTS = ("planar2r", "polar_rp", "cart_pendulum", "pan_tilt", "planar3r")
-TURNING = {"planar2r": "q2", "polar_rp": "q1", "cart_pendulum": "q2", "pan_tilt": "q2", "planar3r": "q3"}
+TURNING = {
+    "planar2r": "q2",
+    "polar_rp": "q1",
+    "cart_pendulum": "q2",
+    "pan_tilt": "q2",
+    "planar3r": "q3",
+}
 FACTORS = ("l1 + l2", "m1 + g*l1", "2 + cos(Q)", "l1*sin(Q)**2 + l1")
 
 
 def shifted(expression, sign):
     """Write cosines as shifted sines."""
-    return expression.replace(sympy.cos, lambda x: sympy.sin(x + sign * sympy.pi / 2, evaluate=False) * sign)
+    return expression.replace(
+        sympy.cos, lambda x: sympy.sin(x + sign * sympy.pi / 2, evaluate=False) * sign
+    )
 
 
 STEPS = {
@@ -28,14 +36,17 @@ STEPS = {
     "together": sympy.together,
     "shift": lambda x: shifted(x, 1),
     "shift back": lambda x: shifted(x, -1),
-    "times one": lambda x: sympy.Mul(x, sympy.sin(sympy.Symbol("Q")) ** 2 + sympy.cos(sympy.Symbol("Q")) ** 2),
+    "times one": lambda x: sympy.Mul(
+        x, sympy.sin(sympy.Symbol("Q")) ** 2 + sympy.cos(sympy.Symbol("Q")) ** 2
+    ),
     "tangents": lambda x: x.replace(sympy.sin, lambda a: sympy.tan(a) * sympy.cos(a)),
     "double angles": lambda x: x.replace(
         lambda e: e.is_Pow and e.exp == 2 and e.base.func is sympy.cos,
         lambda e: (1 + sympy.cos(2 * e.base.args[0])) / 2,
     ),
     "decimals": lambda x: x.replace(
-        lambda e: e.is_Rational and not e.is_Integer and e.q in (2, 4, 5, 8), lambda e: sympy.Float(e, 15)
+        lambda e: e.is_Rational and not e.is_Integer and e.q in (2, 4, 5, 8),
+        lambda e: sympy.Float(e, 15),
     ),
 }
 
@@ -79,7 +90,12 @@ def check(robot, which, steps, factor):
             changed.append(text)
         answer.append(changed if name == "M" else changed[0])
     report = grade_answers(corpus_robot(robot), {name: answer})
-    assert report.verdict in (Verdict.CORRECT, Verdict.ROUNDED), (steps, factor, str(report), answer)
+    assert report.verdict in (Verdict.CORRECT, Verdict.ROUNDED), (
+        steps,
+        factor,
+        str(report),
+        answer,
+    )
     # 15 digits of a decimal that ends are the decimal itself.
     assert report.verdict is Verdict.CORRECT or "decimals" in steps
 
@@ -91,12 +107,21 @@ def test_rewritings_at_full_size(law):
     rng = np.random.default_rng(4)
     for _ in range(law.samples(400)):
         steps = [sorted(STEPS)[k] for k in rng.integers(len(STEPS), size=rng.integers(1, 4))]
-        check(ROBOTS[rng.integers(len(ROBOTS))], rng.integers(4), steps, ["", *FACTORS][rng.integers(5)])
+        check(
+            ROBOTS[rng.integers(len(ROBOTS))],
+            rng.integers(4),
+            steps,
+            ["", *FACTORS][rng.integers(5)],
+        )
     law.holds("rewritings that are not accepted", 0, 0)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_truth_itself_is_accepted(robot):
     for name, rows in TRUTH[robot]:
-        answer = [[str(e) for e in row] for row in rows] if name == "M" else [str(row[0]) for row in rows]
+        answer = (
+            [[str(e) for e in row] for row in rows]
+            if name == "M"
+            else [str(row[0]) for row in rows]
+        )
         assert grade_answers(corpus_robot(robot), {name: answer}).verdict is Verdict.CORRECT

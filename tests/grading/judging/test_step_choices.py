@@ -31,13 +31,22 @@ def steps(*pairs):
 
 def reached(arm, formulas, T):
     """Whether joint values by formulas, in Python and in the order of steps, reach a pose: the truth of a sheet."""
-    values = {name: getattr(np, name) for name in ("sqrt", "pi")} | {"acos": np.arccos, "atan2": np.arctan2}
+    values = {name: getattr(np, name) for name in ("sqrt", "pi")} | {
+        "acos": np.arccos,
+        "atan2": np.arctan2,
+    }
     values |= {name: float(x) for name, x in arm.description.numbers.values.items()}
     values |= dict(zip(("px", "py", "pz"), T[:3, 3], strict=True)) | dict(d1=0.1, a2=0.2, a3=0.15)
     q = np.zeros(arm.n)
     for joint, formula in formulas:
-        q[joint - 1] = eval(formula.replace("^", "**"), {"__builtins__": {}}, values)  # our own formulas
-        values |= {f"q{joint}": q[joint - 1], f"s{joint}": np.sin(q[joint - 1]), f"c{joint}": np.cos(q[joint - 1])}
+        q[joint - 1] = eval(
+            formula.replace("^", "**"), {"__builtins__": {}}, values
+        )  # our own formulas
+        values |= {
+            f"q{joint}": q[joint - 1],
+            f"s{joint}": np.sin(q[joint - 1]),
+            f"c{joint}": np.cos(q[joint - 1]),
+        }
     return np.abs(arm.fk(q) - T)[:3, 3].max() < 1e-9
 
 
@@ -110,12 +119,18 @@ def test_a_step_without_a_solution_leaves_all_roots_open():
     general = [equation, *steps((1, "atan2(py,px) - atan2(l2*s2, l1+l2*c2)"))]
     one = [equation, *steps((1, f"atan2(py,px) + {BETA}"))]
     for given in (general, one):
-        assert [entry.verdict for entry in judged("planar2r", given).entries] == [Verdict.CORRECT] * 2
+        assert [entry.verdict for entry in judged("planar2r", given).entries] == [
+            Verdict.CORRECT
+        ] * 2
 
 
 @pytest.mark.parametrize(
     "equation",
-    ["c2*(px*s1 - py*c1 - d3) = 0", "s2*(px*s1 - py*c1) = d3*s2", "(px*s1 - py*c1 - d3)*(c2 + 2) = 0"],
+    [
+        "c2*(px*s1 - py*c1 - d3) = 0",
+        "s2*(px*s1 - py*c1) = d3*s2",
+        "(px*s1 - py*c1 - d3)*(c2 + 2) = 0",
+    ],
 )
 def test_a_factor_of_zero_determines_nothing(equation):
     entry = judged("puma560", [PUMA[0], dict(joint=2, equation=equation)]).entries[1]
@@ -143,7 +158,10 @@ def test_an_equation_of_one_root_passes_and_says_so(robot, equation, verdict):
 
 
 def test_an_equation_for_the_joint_itself_is_a_solution():
-    given = [dict(joint=2, equation=f"q2 = ±acos({REACH})"), dict(joint=1, equation="q1 = atan2(px,py)")]
+    given = [
+        dict(joint=2, equation=f"q2 = ±acos({REACH})"),
+        dict(joint=1, equation="q1 = atan2(px,py)"),
+    ]
     entries = judged("planar2r", given).entries
     assert [entry.verdict for entry in entries] == [Verdict.CORRECT, Verdict.WRONG]
 
@@ -158,7 +176,9 @@ def test_a_solution_that_is_right_within_the_limits_alone_says_so():
 def test_an_equation_that_says_nothing_does_not_cost_a_right_solution():
     report = judged("puma560", [dict(PUMA[0], equation="s1^2 + c1^2 = 1")])
     assert report.entries[0].verdict is Verdict.CORRECT
-    assert "it says nothing" in next(n.values[0] for n in report.notes if n.kind is NoteKind.STEP_REMARK)
+    assert "it says nothing" in next(
+        n.values[0] for n in report.notes if n.kind is NoteKind.STEP_REMARK
+    )
     alone = judged("puma560", [dict(joint=1, equation="s1^2 + c1^2 = 1")])
     assert alone.missing == tuple(f"ik{k}" for k in range(2, 7))
     assert "ik1: the equation holds for every pose" in str(alone)
@@ -185,7 +205,10 @@ def test_angles_of_the_table_are_read_as_such_where_all_steps_then_pass():
     report = judged("manutec_r3", given)
     assert [entry.verdict for entry in report.entries] == [Verdict.CORRECT] * 3
     assert NoteKind.TABLE_ANGLES in [note.kind for note in report.notes]
-    in_values = [*given[:2], dict(given[2], equation=[links[0].replace("c2 -", "(-s2) -").replace("*s2 =", "*c2 =")])]
+    in_values = [
+        *given[:2],
+        dict(given[2], equation=[links[0].replace("c2 -", "(-s2) -").replace("*s2 =", "*c2 =")]),
+    ]
     del in_values[2]["solution"]
     other = judged("manutec_r3", in_values)
     assert other.entries[2].verdict in (Verdict.CORRECT, Verdict.INCOMPLETE)
@@ -195,13 +218,21 @@ def test_angles_of_the_table_are_read_as_such_where_all_steps_then_pass():
 @pytest.mark.parametrize(
     ("change", "mistake"),
     [
-        (lambda arm: arm.with_tool(pose((0.02, 0, 0.1), euler=(0, 30, 0), degrees=True)), "tool_not_taken_off"),
-        (lambda arm: arm.with_base(pose((0.2, 0, 0.1), euler=(0, 30, 0), degrees=True)), "base_not_taken_off"),
+        (
+            lambda arm: arm.with_tool(pose((0.02, 0, 0.1), euler=(0, 30, 0), degrees=True)),
+            "tool_not_taken_off",
+        ),
+        (
+            lambda arm: arm.with_base(pose((0.2, 0, 0.1), euler=(0, 30, 0), degrees=True)),
+            "base_not_taken_off",
+        ),
     ],
 )
 def test_tools_and_bases_that_are_not_taken_off(change, mistake):
     changed = change(dhkit.Arm.load("puma560")).description
-    report = judge_sheet(changed, sheet_of({"robot": "arm", "answer": {"ik": {"steps": PUMA[:1]}}}), seed=3)
+    report = judge_sheet(
+        changed, sheet_of({"robot": "arm", "answer": {"ik": {"steps": PUMA[:1]}}}), seed=3
+    )
     assert report.entries[0].verdict is Verdict.WRONG
     assert {diagnosis.mistake for diagnosis in report.diagnosis} == {mistake}
 
@@ -213,12 +244,21 @@ def test_tools_and_bases_that_are_not_taken_off(change, mistake):
         (None, f"theta2 = atan2(±sqrt(1-D^2), D), where D = {REACH}"),
         (f"c2 = {REACH} = D", "±acos(D)"),
         ([f"k_{{2}} = {REACH}", "c2 = k_2"], "±acos(k2)"),
-        ([r"r = hypot(px, py)", "r^2 = l1^2+l2^2+2*l1*l2*c2 (3.4)"], "±acos((r^2-l1^2-l2^2)/(2*l1*l2))  (3.5)"),
+        (
+            [r"r = hypot(px, py)", "r^2 = l1^2+l2^2+2*l1*l2*c2 (3.4)"],
+            "±acos((r^2-l1^2-l2^2)/(2*l1*l2))  (3.5)",
+        ),
         ("Eq(px**2 + py**2, l1**2 + l2**2 + 2*l1*l2*cos(q2))", f"q[1] = wrapToPi(±acos({REACH}))"),
         ("T(1,4)^2 + T(2,4)^2 = l1^2 + l2^2 + 2*l1*l2*cos(q(2))", f"q(2) = ±acos({REACH});"),
-        ("T[0,3]**2 + T[1][3]**2 = l1**2 + l2**2 + 2*l1*l2*c2", f"±acos({REACH.replace('px', 'p[0]')})"),
+        (
+            "T[0,3]**2 + T[1][3]**2 = l1**2 + l2**2 + 2*l1*l2*c2",
+            f"±acos({REACH.replace('px', 'p[0]')})",
+        ),
         ("P_x^2 + P_y^2 = l1^2 + l2^2 + 2*l1*l2*c2", f"deg2rad(±acosd({REACH}))"),
-        (r"p_x^2 + p_y^2 &= l_1^2 + l_2^2 + 2 l_1 l_2 c_2 \tag{7}", rf"\theta_2 &= \pm\arccos({REACH}) \\"),
+        (
+            r"p_x^2 + p_y^2 &= l_1^2 + l_2^2 + 2 l_1 l_2 c_2 \tag{7}",
+            rf"\theta_2 &= \pm\arccos({REACH}) \\",
+        ),
     ],
 )
 def test_notations_of_steps(equation, solution):
@@ -232,8 +272,21 @@ def test_a_quantity_defined_in_one_step_is_known_in_the_next():
     ax = "ax = c23*(c1*r13+s1*r23)+s23*r33"  # a name that Paul gives to r13
     given = [
         PUMA[0],
-        dict(PUMA[1], equation=[x, "y = pz - d1", "2*a2*(a3*c3 - d4*s3) = x^2 + y^2 - a2^2 - a3^2 - d4^2"]),
-        dict(joint=2, equation="(a2+a3*c3-d4*s3)*c2 - (d4*c3+a3*s3)*s2 = x", solution=PUMA[2]["solution"]),
-        dict(joint=4, equation=[ax, "ay = c1*r23-s1*r13"], solution=["atan2(ay, ax)", "atan2(-ay, -ax)"]),
+        dict(
+            PUMA[1],
+            equation=[x, "y = pz - d1", "2*a2*(a3*c3 - d4*s3) = x^2 + y^2 - a2^2 - a3^2 - d4^2"],
+        ),
+        dict(
+            joint=2,
+            equation="(a2+a3*c3-d4*s3)*c2 - (d4*c3+a3*s3)*s2 = x",
+            solution=PUMA[2]["solution"],
+        ),
+        dict(
+            joint=4,
+            equation=[ax, "ay = c1*r23-s1*r13"],
+            solution=["atan2(ay, ax)", "atan2(-ay, -ax)"],
+        ),
     ]
-    assert [entry.verdict for entry in judged("puma560", given).entries[:4]] == [Verdict.CORRECT] * 4
+    assert [entry.verdict for entry in judged("puma560", given).entries[:4]] == [
+        Verdict.CORRECT
+    ] * 4

@@ -119,13 +119,22 @@ def test_numbers_in_place_of_parameters():
     assert frames(turned) == ("frame 2's x axis points the other way",)
     outside = judge("planar2r", [["q1", "0", f"{l1}*exp(0)", "0"], ["q2", "0", l2, "0"]])
     assert verdicts(outside) == (UNDECIDED, CORRECT)
-    assert verdicts(judge("planar2r", [["q1", "0", "l2", "0"], ["q2", "0", "l1", "0"]])) == (WRONG, WRONG)
+    assert verdicts(judge("planar2r", [["q1", "0", "l2", "0"], ["q2", "0", "l1", "0"]])) == (
+        WRONG,
+        WRONG,
+    )
 
 
 def test_what_the_ring_has_not_is_judged_in_doubles():
     rows = own_table(library_robot("puma560"))
-    assert verdicts(judge("puma560", with_entries(rows, alpha1="2*atan(exp(0))"))) == (UNDECIDED, *[CORRECT] * 5)
-    assert verdicts(judge("puma560", with_entries(rows, alpha1="exp(0)"))) == (WRONG, *[CORRECT] * 5)
+    assert verdicts(judge("puma560", with_entries(rows, alpha1="2*atan(exp(0))"))) == (
+        UNDECIDED,
+        *[CORRECT] * 5,
+    )
+    assert verdicts(judge("puma560", with_entries(rows, alpha1="exp(0)"))) == (
+        WRONG,
+        *[CORRECT] * 5,
+    )
     for entry in ("1/0", "1e300", "sqrt(-1)", "10^40*exp(1)"):
         assert verdicts(judge("puma560", with_entries(rows, d1=entry))) == (WRONG, *[CORRECT] * 5)
 
@@ -150,14 +159,20 @@ def reversed_z(rows, i):
     if i < len(rows):
         theta, d, a, alpha = rows[i]
         q = f"q{i + 1}"
-        theta, d = (f"{q} - ({theta} - {q})", f"-({d})") if q in theta else (f"-({theta})", f"{q} - ({d} - {q})")
+        theta, d = (
+            (f"{q} - ({theta} - {q})", f"-({d})")
+            if q in theta
+            else (f"-({theta})", f"{q} - ({d} - {q})")
+        )
         rows[i] = [theta, d, a, f"{alpha} - pi"]
     return rows
 
 
 @only_accepting
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["planar2r", "polar_rp", "stanford", "puma560", "ur5", "cobra600", "jaco"])
+@pytest.mark.parametrize(
+    "name", ["planar2r", "polar_rp", "stanford", "puma560", "ur5", "cobra600", "jaco"]
+)
 @pytest.mark.parametrize("change", [turned_x, reversed_z])
 def test_reversed_axes_are_the_same_arm(name, change):
     rows, word = own_table(library_robot(name)), "x" if change is turned_x else "z"
@@ -218,7 +233,9 @@ def test_parallel_axes_leave_the_height_of_the_base_open():
 
 
 def test_another_zero_is_said():
-    rows = with_entries(own_table(library_robot("puma560")), theta2="q2 + pi/2", theta3="q3 - 30*deg")
+    rows = with_entries(
+        own_table(library_robot("puma560")), theta2="q2 + pi/2", theta3="q3 - 30*deg"
+    )
     judgement = judge("puma560", rows)
     assert slipped(judgement)
     assert frames(judgement) == (
@@ -239,14 +256,18 @@ def test_another_zero_between_parallel_axes():
     assert len(frames(judgement)) <= 2
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", slow_if(True, "ur5"), "al5d", slow_if(True, "panda")])
+@pytest.mark.parametrize(
+    "name", ["puma560", "stanford", slow_if(True, "ur5"), "al5d", slow_if(True, "panda")]
+)
 def test_another_zero_in_the_other_convention(name):
     description = library_robot(name)
     rows = other_table(description)
     rows[1][0] = f"{rows[1][0]} + pi/2"
     judgement = judge(description, rows, other(description.convention))
     assert slipped(judgement)
-    assert frames(judgement) == ("q2 is counted from another zero: there the file's q2 is 90 degrees",)
+    assert frames(judgement) == (
+        "q2 is counted from another zero: there the file's q2 is 90 degrees",
+    )
 
 
 @only_accepting
@@ -272,7 +293,10 @@ def test_another_twist_is_another_arm():
     rows = own_table(library_robot("puma560"))
     for i in range(1, 6):
         assert (
-            verdicts(judge("puma560", with_entries(rows, **{f"alpha{i}": f"{rows[i - 1][3]} + 0.1"})))[i - 1] is WRONG
+            verdicts(
+                judge("puma560", with_entries(rows, **{f"alpha{i}": f"{rows[i - 1][3]} + 0.1"}))
+            )[i - 1]
+            is WRONG
         )
 
 
@@ -313,10 +337,16 @@ def test_mistakes_of_a_row_have_names(name, entries, mistake):
 
 @pytest.mark.parametrize(
     ("theta", "mistake"),
-    [("q2", "theta_offset_forgotten"), ("q2 + pi/2", "theta_offset_sign"), ("q2 - 90", "degrees_for_radians")],
+    [
+        ("q2", "theta_offset_forgotten"),
+        ("q2 + pi/2", "theta_offset_sign"),
+        ("q2 - 90", "degrees_for_radians"),
+    ],
 )
 def test_a_missing_offset_is_another_zero_and_is_named_too(theta, mistake):
-    judgement = judge("kuka_kr30_3", with_entries(own_table(library_robot("kuka_kr30_3")), theta2=theta))
+    judgement = judge(
+        "kuka_kr30_3", with_entries(own_table(library_robot("kuka_kr30_3")), theta2=theta)
+    )
     assert mistakes(judgement) == [(mistake, 1)]
     assert slipped(judgement)
     assert len(frames(judgement)) == 1
@@ -346,7 +376,13 @@ def test_another_zero_has_one_verdict_one_note_and_one_score_whatever_the_consta
 def test_another_zero_of_several_joints_and_of_a_prismatic_one():
     description = library_robot("stanford")
     own = own_table(description)
-    moved = with_entries(own, theta1="q1 + 0.2", theta2=f"{own[1][0]} - 0.7", d3=f"{own[2][1]} + 1/8", theta6="q6 + 1")
+    moved = with_entries(
+        own,
+        theta1="q1 + 0.2",
+        theta2=f"{own[1][0]} - 0.7",
+        d3=f"{own[2][1]} + 1/8",
+        theta6="q6 + 1",
+    )
     judgement = judge(description, moved)
     assert verdicts(judgement) == (WRONG, WRONG, WRONG, CORRECT, CORRECT, WRONG)
     assert slipped(judgement)
@@ -366,7 +402,11 @@ def with_renamed(rows, i, j):
     rows = [list(row) for row in rows]
     rows[i], rows[j] = rows[j], rows[i]
     for k in (i, j):
-        rows[k][0] = rows[k][0].replace(f"q{i + j + 1 - k + 1}", f"q{k + 1}").replace(f"q{i + j - k + 1}", f"q{k + 1}")
+        rows[k][0] = (
+            rows[k][0]
+            .replace(f"q{i + j + 1 - k + 1}", f"q{k + 1}")
+            .replace(f"q{i + j - k + 1}", f"q{k + 1}")
+        )
     return rows
 
 
@@ -380,7 +420,9 @@ def test_the_table_of_the_other_convention(name):
 
 def test_a_mirrored_turret_is_the_same_arm():
     """Reversing the twist of two axes that meet, with nothing beyond but planar links, reverses a joint."""
-    judgement = judge("pan_tilt", with_entries(own_table(library_robot("pan_tilt")), alpha1="-pi/2"))
+    judgement = judge(
+        "pan_tilt", with_entries(own_table(library_robot("pan_tilt")), alpha1="-pi/2")
+    )
     assert "q2 is counted the other way round" in frames(judgement)
     assert mistakes(judgement) == [("alpha_sign", 0)]
 
@@ -397,7 +439,10 @@ def test_a_task_may_give_frames_and_the_zero_pose():
         assert [found.mistake for found in judgement.diagnosis] == ["other_frames"]
     trees = [[read(str(entry)) for entry in row] for row in turned_x(own_table(description), 2)]
     assert (
-        judge_table(description, trees, description.convention, task=Requirements(zero_given=True)).verdict is UNDECIDED
+        judge_table(
+            description, trees, description.convention, task=Requirements(zero_given=True)
+        ).verdict
+        is UNDECIDED
     )
 
 
@@ -411,7 +456,10 @@ def test_one_joint():
     ("rows", "complaint"),
     [
         ([["q1", "0", "l1", "0"]], "1 row; expected 2"),
-        ([["q1", "0", "l1"], ["q2", "0", "l2", "0"]], "row 1: 3 entries; expected theta, d, a, alpha"),
+        (
+            [["q1", "0", "l1"], ["q2", "0", "l2", "0"]],
+            "row 1: 3 entries; expected theta, d, a, alpha",
+        ),
         ([["q1", "0", "l1", "0"], ["q3", "0", "l2", "0"]], "row 2, theta: unknown name 'q3'"),
         ([["q1", "0", "l1", "0"], ["q2", "0", "foo(l2)", "0"]], "unknown function 'foo'"),
     ],
@@ -434,7 +482,11 @@ def test_random_gauges_of_random_arms():
         n = int(random.integers(2, 6))
         kinds = "".join(random.choice(["R", "R", "P"], n))
         rows = [
-            (f"pi/12*{random.integers(-6, 6)}", *np.round(random.uniform(0.1, 0.5, 2), 3).tolist(), x)
+            (
+                f"pi/12*{random.integers(-6, 6)}",
+                *np.round(random.uniform(0.1, 0.5, 2), 3).tolist(),
+                x,
+            )
             for x in random.choice(["0", "pi/2", "-pi/2", "pi/6"], n)
         ]
         arm = replace(from_dh(rows, kinds=kinds), name="random")
@@ -457,8 +509,13 @@ def test_letters_of_equal_value_are_letters_in_other_frames_too():
 
 
 def test_a_number_may_stand_in_one_entry_of_a_row():
-    arm = from_dh([("beta", "l1", 0, "beta"), (0, 0, "l2", 0)], parameters={"beta": "pi/2", "l1": 1.0, "l2": 0.5})
+    arm = from_dh(
+        [("beta", "l1", 0, "beta"), (0, 0, "l2", 0)],
+        parameters={"beta": "pi/2", "l1": 1.0, "l2": 0.5},
+    )
     row = ["q2", "0", "l2", "0"]
-    assert dict(judge(arm, [["q1 + beta", "l1", "0", "pi/2"], row]).at_values) == {"beta": pytest.approx(np.pi / 2)}
+    assert dict(judge(arm, [["q1 + beta", "l1", "0", "pi/2"], row]).at_values) == {
+        "beta": pytest.approx(np.pi / 2)
+    }
     assert judge(arm, [["q1 + pi/2", "1", "0", "beta"], row]).verdict is CORRECT
     assert judge(arm, [["q1 + pi/2", "2", "0", "beta"], row]).verdict is WRONG

@@ -91,7 +91,10 @@ def test_numbers_in_place_of_parameters_are_the_files():
     report = ARM.grade(g=["2*9.81*0.25*c1 + 1.5*9.81*(0.5*c1 + 0.2*c12)", "1.5*9.81*0.2*c12"])
     assert report.verdict is Verdict.CORRECT
     assert any(note.kind is NoteKind.NUMBERS and "l2 = 0.4" in note.values for note in report.notes)
-    assert verdict(g=["2*9.81*0.25*c1 + 1.5*9.81*(0.5*c1 + 0.2*c12)", "1.5*9.81*0.3*c12"]) is Verdict.WRONG
+    assert (
+        verdict(g=["2*9.81*0.25*c1 + 1.5*9.81*(0.5*c1 + 0.2*c12)", "1.5*9.81*0.3*c12"])
+        is Verdict.WRONG
+    )
 
 
 def test_numbers_and_symbols_may_be_mixed_but_a_factor_of_one_is_no_number():
@@ -104,9 +107,15 @@ def test_numbers_and_symbols_may_be_mixed_but_a_factor_of_one_is_no_number():
     assert ARM.grade(M=rows).of("M")[3].verdict is Verdict.WRONG
     # mc is 1 kg: a torque without it has forgotten it.
     cart = Arm.load("cart_pendulum")
-    tau = ["(mc + mp)*qdd1 + mp*l/2*(c2*qdd2 - s2*qd2^2)", "mp*l*c2/2*qdd1 + mp*l^2/3*qdd2 + mp*g*l*s2/2"]
+    tau = [
+        "(mc + mp)*qdd1 + mp*l/2*(c2*qdd2 - s2*qd2^2)",
+        "mp*l*c2/2*qdd1 + mp*l^2/3*qdd2 + mp*g*l*s2/2",
+    ]
     assert cart.grade(tau=tau).verdict is Verdict.CORRECT
-    assert cart.grade(K="mc*qd1^2/2 + mp*qd1^2/2 + mp*l*c2*qd1*qd2/2 + mp*l^2*qd2^2/6").verdict is Verdict.CORRECT
+    assert (
+        cart.grade(K="mc*qd1^2/2 + mp*qd1^2/2 + mp*l*c2*qd1*qd2/2 + mp*l^2*qd2^2/6").verdict
+        is Verdict.CORRECT
+    )
 
 
 def test_energies_count_from_any_zero():
@@ -120,7 +129,10 @@ def test_a_lagrangian_may_differ_by_a_total_derivative_where_the_task_says_so():
     answer = {"L": f"({K}) - ({V}) + qd1*c1*c2 - qd2*s1*s2"}  # d/dt (s1 c2)
     assert ARM.grade(answer).verdict is Verdict.WRONG
     assert ARM.grade(answer, task={"total_derivative": True}).verdict is Verdict.CORRECT
-    assert ARM.grade({"L": f"({K}) - ({V}) + qd1*c2"}, task={"total_derivative": True}).verdict is Verdict.WRONG
+    assert (
+        ARM.grade({"L": f"({K}) - ({V}) + qd1*c2"}, task={"total_derivative": True}).verdict
+        is Verdict.WRONG
+    )
 
 
 def test_any_factorization_of_coriolis_torques_is_right_and_named():
@@ -139,14 +151,19 @@ def test_half_angles_are_undecided_or_refuted_with_a_state():
     half = "m2*g*l2/2*(2*cos((q1 + q2)/2)^2 - 1)"
     report = ARM.grade(g=[G[0], half])
     assert report.verdict is Verdict.UNDECIDED
-    assert "1000 random states" in report.entries[1].statement and "half" not in report.entries[0].statement
+    assert (
+        "1000 random states" in report.entries[1].statement
+        and "half" not in report.entries[0].statement
+    )
     wrong = ARM.grade(g=[G[0], half.replace("1)", "1.000000001)")]).entries[1]
     assert wrong.verdict is Verdict.WRONG
     vocabulary = Vocabulary(ARM.description)
     answer = doubles(read_answer(wrong.answer, vocabulary), wrong.witness.state)
     assert answer == pytest.approx(wrong.witness.answer, rel=1e-12)
     right = doubles(read_answer(G[1], vocabulary), wrong.witness.state)
-    assert right == pytest.approx(wrong.witness.truth, rel=1e-12) and right != pytest.approx(answer, rel=1e-10)
+    assert right == pytest.approx(wrong.witness.truth, rel=1e-12) and right != pytest.approx(
+        answer, rel=1e-10
+    )
 
 
 @pytest.mark.parametrize(
@@ -213,7 +230,9 @@ def test_torques_of_wrong_parts_follow_from_them():
     assert {entry.follows for entry in report.of("tau")} == {"M"}
     K2 = f"2*({K})"
     assert {entry.follows for entry in ARM.grade(K=K2, M=doubled).of("M")} == {"K"}
-    assert {entry.follows for entry in ARM.grade(M=doubled, h=[f"2*({x})" for x in H]).of("h")} == {"M"}
+    assert {entry.follows for entry in ARM.grade(M=doubled, h=[f"2*({x})" for x in H]).of("h")} == {
+        "M"
+    }
 
 
 def test_absolute_angles():
@@ -241,7 +260,10 @@ def test_viscous_friction_where_the_task_says_so():
     assert ARM.grade(tau=tau).verdict is Verdict.WRONG
     report = ARM.grade({"tau": [x.replace("+ 0.0", "- 0.0") for x in tau]}, task={"friction": True})
     assert [found.mistake for found in report.diagnosis] == ["friction_sign"]
-    assert ARM.grade({"tau": TAU}, task={"friction": True}).diagnosis[0].mistake == "friction_forgotten"
+    assert (
+        ARM.grade({"tau": TAU}, task={"friction": True}).diagnosis[0].mistake
+        == "friction_forgotten"
+    )
 
 
 def test_two_mistakes_in_one_quantity_are_both_named():
@@ -262,7 +284,10 @@ def test_slips_in_single_terms_are_named_with_the_term():
     assert found.mistake == "term_extra" and found.sentence == "There is a term too much: m1*l1*l2."
     (found,) = ARM.grade(g=["m1*g*l1*c1/2 + m2*g*l1*c1", G[1]]).diagnosis
     assert found.mistake == "term_missing"
-    assert found.sentence == "A term is missing: one with gravity, link 2." and found.second_hint == "m2*g*l2*c12/2"
+    assert (
+        found.sentence == "A term is missing: one with gravity, link 2."
+        and found.second_hint == "m2*g*l2*c12/2"
+    )
     assert found.hint == "Look again at the terms with gravity, link 2: is each there?"
 
 
@@ -275,11 +300,15 @@ def test_answers_of_other_kinds():
         Verdict.CORRECT,
         Verdict.ROUNDED,
     )
-    report = ARM.grade(M=lambda q: ARM.mass_matrix(q), h=lambda q, qd: ARM.coriolis_matrix(q, qd) @ qd)
+    report = ARM.grade(
+        M=lambda q: ARM.mass_matrix(q), h=lambda q, qd: ARM.coriolis_matrix(q, qd) @ qd
+    )
     assert report.verdict is Verdict.UNDECIDED
     wrong = ARM.grade(g=lambda q: -ARM.gravity_torque(q))
     assert wrong.verdict is Verdict.WRONG
-    assert wrong.entries[0].witness.answer == pytest.approx(-wrong.entries[0].witness.truth, rel=1e-12)
+    assert wrong.entries[0].witness.answer == pytest.approx(
+        -wrong.entries[0].witness.truth, rel=1e-12
+    )
     array = np.array([["m2*g*l2*c12/2"]])
     assert ARM.grade(g=[G[0], array[0, 0]]).verdict is Verdict.CORRECT
 
@@ -319,7 +348,9 @@ def test_a_quantity_that_cannot_be_read_leaves_the_others_judged():
         ("M", Verdict.UNREADABLE),
     ]
     assert "did you mean 'g'?" in report.entries[1].statement
-    report = ARM.grade({"V": V, "dh": {"rows": [["q1", "0", "l1", "0"]]}, "ik": {"branches": [["q2", "q1"]]}})
+    report = ARM.grade(
+        {"V": V, "dh": {"rows": [["q1", "0", "l1", "0"]]}, "ik": {"branches": [["q2", "q1"]]}}
+    )
     assert [(entry.quantity, entry.verdict.value) for entry in report.entries] == [
         ("V", "correct"),
         ("dh", "unreadable"),
@@ -329,7 +360,10 @@ def test_a_quantity_that_cannot_be_read_leaves_the_others_judged():
 
 def test_entries_that_stay_empty_make_a_sheet_incomplete():
     report = ARM.grade(M=[["", M[0][1]], [M[1][0], M[1][1]]])
-    assert [entry.verdict for entry in report.entries] == [Verdict.INCOMPLETE, *[Verdict.CORRECT] * 3]
+    assert [entry.verdict for entry in report.entries] == [
+        Verdict.INCOMPLETE,
+        *[Verdict.CORRECT] * 3,
+    ]
     assert report.verdict is Verdict.INCOMPLETE and report.missing == ("M11",) and not report
 
 
@@ -337,7 +371,10 @@ def test_own_numbers_are_those_of_the_shorthand_too():
     names = {"q": ["q0", "q1"]}
     g = ["(m1/2 + m2)*g*l1*c0 + m2*g*l2*c01/2", "m2*g*l2*cos(q0 + q1)/2"]
     assert ARM.grade({"g": g}, names=names).verdict is Verdict.CORRECT
-    assert ARM.grade({"g": [x.replace("c0", "c1") for x in g]}, names=names).verdict is not Verdict.CORRECT
+    assert (
+        ARM.grade({"g": [x.replace("c0", "c1") for x in g]}, names=names).verdict
+        is not Verdict.CORRECT
+    )
     h = ["-m2*l1*l2*s1*(q0dot*q1dot + q1dot^2/2)", "m2*l1*l2*s1*q0dot^2/2"]
     assert ARM.grade({"h": h}, names=names).verdict is Verdict.CORRECT
 
@@ -385,7 +422,9 @@ def test_more_mistakes_are_named(answers, mistake):
 def test_a_robot_without_bodies_has_kinematics_only():
     arm = Arm.load("puma560_cao")
     bare = Arm.from_dh([(0, 0, 0.3, 0)])
-    assert bare.grade(A1=[["c1", "-s1", 0, "0.3*c1"], ["s1", "c1", 0, "0.3*s1"], [0, 0, 1, 0], [0, 0, 0, 1]])
+    assert bare.grade(
+        A1=[["c1", "-s1", 0, "0.3*c1"], ["s1", "c1", 0, "0.3*s1"], [0, 0, 1, 0], [0, 0, 0, 1]]
+    )
     with pytest.raises(DescriptionError, match="no body"):
         bare.grade(M=[["1"]])
     assert arm.n == 6

@@ -79,7 +79,10 @@ ELBOW_V = "m1*g*d1/2 + m2*g*(d1 + a2*s2/2) + m3*g*(d1 + a2*s2 + {})"
 
 
 def changed(rows, i, j, entry):
-    return [[entry if (i, j) == (a, b) else old for b, old in enumerate(row)] for a, row in enumerate(rows)]
+    return [
+        [entry if (i, j) == (a, b) else old for b, old in enumerate(row)]
+        for a, row in enumerate(rows)
+    ]
 
 
 def halved(rows):
@@ -88,12 +91,32 @@ def halved(rows):
 
 CASES = {
     # One entry of C: named there, and the others of its row are not blamed
-    "C: a rate": (PLANAR, {"C": changed(C, 0, 1, "-m2*l1*l2*s2*qd1/2")}, {"C12": "term_missing", "no C11": None}),
-    "C: sign": (PLANAR, {"C": changed(C, 0, 1, f"-({C[0][1]})")}, {"C12": "entry_sign", "no C11": None}),
-    "C: half": (PLANAR, {"C": changed(C, 1, 0, f"({C[1][0]})/2")}, {"C21": "term_factor", "no C22": None}),
+    "C: a rate": (
+        PLANAR,
+        {"C": changed(C, 0, 1, "-m2*l1*l2*s2*qd1/2")},
+        {"C12": "term_missing", "no C11": None},
+    ),
+    "C: sign": (
+        PLANAR,
+        {"C": changed(C, 0, 1, f"-({C[0][1]})")},
+        {"C12": "entry_sign", "no C11": None},
+    ),
+    "C: half": (
+        PLANAR,
+        {"C": changed(C, 1, 0, f"({C[1][0]})/2")},
+        {"C21": "term_factor", "no C22": None},
+    ),
     "C: zero": (PLANAR, {"C": changed(C, 0, 1, "0")}, {"C12": "entry_zero", "no C11": None}),
-    "C: polar": (POLAR, {"C": [["m2*q2*qd2", "m2*q2*qd2"], ["-m2*q2*qd1", "0"]]}, {"C12": "term_rate", "no C11": None}),
-    "C: cart": (CART, {"C": [["0", "-mp*l*s2*qd2"], ["0", "0"]]}, {"C12": "term_factor", "no C11": None}),
+    "C: polar": (
+        POLAR,
+        {"C": [["m2*q2*qd2", "m2*q2*qd2"], ["-m2*q2*qd1", "0"]]},
+        {"C12": "term_rate", "no C11": None},
+    ),
+    "C: cart": (
+        CART,
+        {"C": [["0", "-mp*l*s2*qd2"], ["0", "0"]]},
+        {"C12": "term_factor", "no C11": None},
+    ),
     # What a right answer on the sheet denies
     "M halved": (PLANAR, {"K": K, "M": halved(M)}, {"M11": "entry_halved"}),
     "M halved alone": (PLANAR, {"M": halved(M)}, {"M11": "half_squared"}),
@@ -115,8 +138,16 @@ CASES = {
         {"M12": "term_missing"},
     ),
     # Angles, heights, bodies
-    "own angle in the height": (ELBOW, {"V": ELBOW_V.format("a3*s3/2")}, {"V": "height_relative_angle"}),
-    "height lacks a link": (ELBOW, {"V": ELBOW_V.format("a3*s23/2 - a2*s2")}, {"V": "term_missing"}),
+    "own angle in the height": (
+        ELBOW,
+        {"V": ELBOW_V.format("a3*s3/2")},
+        {"V": "height_relative_angle"},
+    ),
+    "height lacks a link": (
+        ELBOW,
+        {"V": ELBOW_V.format("a3*s23/2 - a2*s2")},
+        {"V": "term_missing"},
+    ),
     "cosine in the heights": (
         PLANAR,
         {"M": M, "g": ["-" + G[0].replace("c", "s").replace("+ m2", "- m2"), "-m2*g*l2*s12/2"]},
@@ -124,7 +155,10 @@ CASES = {
     ),
     "discs at two links of three": (
         ELBOW,
-        {"M33": "m3*a3^2/4 + m3*a3^2/2", "M22": "m2*a2^2/4 + m2*a2^2/2 + m3*(a2^2 + a2*a3*c3 + a3^2/4) + m3*a3^2/2"},
+        {
+            "M33": "m3*a3^2/4 + m3*a3^2/2",
+            "M22": "m2*a2^2/4 + m2*a2^2/2 + m3*(a2^2 + a2*a3*c3 + a3^2/4) + m3*a3^2/2",
+        },
         {"M33": "disc_for_rod", "M22": "disc_for_rod"},
     ),
     "weight on the waist": (ELBOW, {"g1": "m2*g*a2*c1/2"}, {"g1": "weight_on_vertical_axis"}),

@@ -14,7 +14,11 @@ from grading_answers import ROBOTS, corpus_robot
 
 ARM = Arm.load("planar2r")
 POLAR = Arm.load("polar_rp")
-M11, M12, M22 = "(m1/3 + m2)*l1^2 + m2*l2^2/3 + m2*l1*l2*c2", "m2*l2^2/3 + m2*l1*l2*c2/2", "m2*l2^2/3"
+M11, M12, M22 = (
+    "(m1/3 + m2)*l1^2 + m2*l2^2/3 + m2*l1*l2*c2",
+    "m2*l2^2/3 + m2*l1*l2*c2/2",
+    "m2*l2^2/3",
+)
 G = ["m1*g*l1*c1/2 + m2*g*l1*c1 + m2*g*l2*c12/2", "m2*g*l2*c12/2"]
 H = ["-m2*l1*l2*s2*qd1*qd2 - m2*l1*l2*s2*qd2^2/2", "m2*l1*l2*s2*qd1^2/2"]
 SCALED = "(1000*m1*l1^2/3)*0"
@@ -44,7 +48,10 @@ SLIPS = {
     "too_few_digits": {"M": [[M11, M12], [M12, "0.33*m2*l2^2"]]},
     "mass_matrix_not_symmetric": {"M": [[M11, M12], ["m2*l2^2/3 + m2*l1*l2*c1", M22]]},
     "degrees_for_radians": {
-        "g": [G[0].replace("c12", "cosd(q1 + q2)").replace("c1", "cosd(q1)"), "m2*g*l2*cosd(q1 + q2)/2"]
+        "g": [
+            G[0].replace("c12", "cosd(q1 + q2)").replace("c1", "cosd(q1)"),
+            "m2*g*l2*cosd(q1 + q2)/2",
+        ]
     },
     "weight_on_vertical_axis": None,
     "duplicate_branch": None,
@@ -67,14 +74,21 @@ def test_each_mistake_has_a_sentence_and_a_hint_of_its_own_subject():
         assert mistake.hint.startswith("Look again") and mistake.sentence[-1] not in ".!"
         # A hint belongs to one subject: it must not send a student from the table to the energies.
         assert subjects.setdefault(mistake.hint, mistake.subject) is mistake.subject, mistake
-        assert sentence_of(mistake.identity).endswith((".", "?")) and hint_of(mistake.identity) == mistake.hint
+        assert (
+            sentence_of(mistake.identity).endswith((".", "?"))
+            and hint_of(mistake.identity) == mistake.hint
+        )
 
 
 def test_every_mistake_can_be_provoked():
     """By a variant on a robot of the corpus, by a slip below, or by the tests of tables and of inverse kinematics."""
     tables = [variants_of(truth_of(corpus_robot(robot)), frozenset()) for robot in ROBOTS]
     made = {variant.identity for variants in tables for variant in variants.dynamic}
-    friction = {"friction_forgotten", "friction_sign", "friction_gear"}  # tests/grading/test_findings.py
+    friction = {
+        "friction_forgotten",
+        "friction_sign",
+        "friction_gear",
+    }  # tests/grading/test_findings.py
     absolute = {"relative_for_absolute", "motor_torques"}
     tests = {*KINEMATIC_MISTAKES, *JACOBIAN, *TABLE, *INVERSE, *SLIPS, *friction, *absolute}
     bodies = {
@@ -94,7 +108,11 @@ def test_slips_are_named(mistake):
     found = {one.mistake for one in report.diagnosis}
     alike = {name.partition(" (")[0] for one in report.diagnosis for name in one.equivalent}
     assert mistake in found | alike, str(report)
-    assert all(entry.verdict.value == "wrong" for entry in report.entries if entry.name in report.diagnosis[0].entries)
+    assert all(
+        entry.verdict.value == "wrong"
+        for entry in report.entries
+        if entry.name in report.diagnosis[0].entries
+    )
 
 
 def test_a_weight_on_a_vertical_axis():
@@ -105,11 +123,15 @@ def test_a_weight_on_a_vertical_axis():
 
 
 @pytest.mark.parametrize(
-    ("declared", "mistake"), [("absolute", "relative_for_absolute"), ("relative", "absolute_for_relative")]
+    ("declared", "mistake"),
+    [("absolute", "relative_for_absolute"), ("relative", "absolute_for_relative")],
 )
 def test_angles_that_are_declared_wrongly(declared, mistake):
     relative = [[M11, M12], [M12, M22]]
-    absolute = [["(m1/3 + m2)*l1^2", "m2*l1*l2*cos(q2 - q1)/2"], ["m2*l1*l2*cos(q2 - q1)/2", "m2*l2^2/3"]]
+    absolute = [
+        ["(m1/3 + m2)*l1^2", "m2*l1*l2*cos(q2 - q1)/2"],
+        ["m2*l1*l2*cos(q2 - q1)/2", "m2*l2^2/3"],
+    ]
     answer = relative if declared == "absolute" else absolute
     report = ARM.grade(M=answer, names={"angles": declared})
     assert mistake in {one.mistake for one in report.diagnosis}, str(report)

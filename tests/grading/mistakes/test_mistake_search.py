@@ -36,7 +36,11 @@ def truth():
 
 
 def test_every_variant_is_a_mistake_of_the_library():
-    variants = [*energy_variants(truth()), *equation_variants(truth()), *parameter_variants(truth())]
+    variants = [
+        *energy_variants(truth()),
+        *equation_variants(truth()),
+        *parameter_variants(truth()),
+    ]
     assert {variant.identity for variant in variants} <= LIBRARY.keys()
     assert derivatives_of_cosines(truth()).identity in LIBRARY
     assert {variant.rarity for variant in variants} == {0, 1, 2}
@@ -55,7 +59,10 @@ def test_the_change_of_all_energy_is_all_of_the_equation():
     lag = truth().lagrangian
     change = Change(lag.K, lag.V)
     for quantity in ("M", "h", "g", "tau", "K", "V", "L"):
-        assert all(a == b for a, b in zip(change.of(quantity).flat, right_value(lag, quantity).flat, strict=True))
+        assert all(
+            a == b
+            for a, b in zip(change.of(quantity).flat, right_value(lag, quantity).flat, strict=True)
+        )
 
 
 @pytest.mark.parametrize(
@@ -82,19 +89,29 @@ def test_lengths_are_known_by_their_use():
 
 def test_zeros_show_by_themselves_and_nothing_wrong_is_explained_by_nothing():
     zeros = {"h": ["0", "0"]}
-    assert judge_sheet(ARM, sheet_of({"answer": zeros}), seed=1).diagnosis[0].mistake == "velocity_torques_missing"
+    assert (
+        judge_sheet(ARM, sheet_of({"answer": zeros}), seed=1).diagnosis[0].mistake
+        == "velocity_torques_missing"
+    )
     assert explain(truth(), {}) == []
     assert plain_causes.zeros(truth(), {}, set()) == {}
 
 
 def test_one_sentence_for_one_mistake():
-    said = [Diagnosis("x", "It is wrong.", "M", ("M11",)), Diagnosis("x", "It is wrong.", "g", ("g1",))]
+    said = [
+        Diagnosis("x", "It is wrong.", "M", ("M11",)),
+        Diagnosis("x", "It is wrong.", "g", ("g1",)),
+    ]
     (one,) = merge(said)
     assert (one.where, one.entries) == ("M, g", ("M11", "g1"))
 
 
 def test_a_report_is_the_same_in_every_form():
-    report = GradeReport("arm", entries=(Entry("V", (), Verdict.WRONG, "1"),), diagnosis=(Diagnosis("x", "So.", "V"),))
+    report = GradeReport(
+        "arm",
+        entries=(Entry("V", (), Verdict.WRONG, "1"),),
+        diagnosis=(Diagnosis("x", "So.", "V"),),
+    )
     sheet = marks(report, Rubric())
     assert report_of(report.to_json()) == report
     assert list(diagnosis_lines(report)) == ["V: So."]

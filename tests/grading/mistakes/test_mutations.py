@@ -30,7 +30,11 @@ def test_every_mistake_is_found_and_named(robot, law):
     """Exactly for every quantity that it changes; an equivalent mistake's name is as good."""
     description = corpus_robot(robot)
     truth = truth_of(description)
-    cases = [(variant, quantity) for variant in variants_of(truth, frozenset()).dynamic for quantity in DYNAMICS]
+    cases = [
+        (variant, quantity)
+        for variant in variants_of(truth, frozenset()).dynamic
+        for quantity in DYNAMICS
+    ]
     size = law.samples(len(cases))
     chosen = np.random.default_rng(0).permutation(len(cases))[:size]
     missed = []
@@ -54,7 +58,11 @@ def test_every_kinematic_mistake_is_found_and_named(robot, law):
     description = corpus_robot(robot)
     truth = truth_of(description)
     quantities = [*(f"A{i + 1}" for i in range(description.n)), "T", "J"]
-    cases = [(variant, quantity) for variant in variants_of(truth, frozenset()).kinematic for quantity in quantities]
+    cases = [
+        (variant, quantity)
+        for variant in variants_of(truth, frozenset()).kinematic
+        for quantity in quantities
+    ]
     size = law.samples(min(len(cases), 400))
     missed = []
     for k in sorted(np.random.default_rng(1).permutation(len(cases))[:size]):

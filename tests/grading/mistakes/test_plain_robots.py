@@ -23,7 +23,9 @@ def arm(name, parameters, rows, gravity="[0, 0, '-g']", further=""):
     text = f'format = 1\nname = "{name}"\nconvention = "standard"\ngravity = {gravity}\n{further}\n[parameters]\n'
     text += "\n".join(f"{key} = {value}" for key, value in {"g": 9.81, **parameters}.items()) + "\n"
     for kind, theta, d, a, alpha, body in rows:
-        text += ROW.format(kind=kind, theta=theta, d=d, a=a, alpha=alpha, body=f"body = {body}" if body else "")
+        text += ROW.format(
+            kind=kind, theta=theta, d=d, a=a, alpha=alpha, body=f"body = {body}" if body else ""
+        )
     return dhkit.Arm(from_toml(text))
 
 
@@ -32,12 +34,21 @@ LIFT = arm(
     dict(m1=3.1, m2=1.3, r=0.21, J=0.04),
     [
         ("prismatic", 0, 0, 0, "'pi/2'", "{ mass = 'm1', com = [0, 0, 0] }"),
-        ("revolute", 0, 0, 0.5, 0, "{ mass = 'm2', com = ['r - 0.5', 0, 0], inertia = { zz = 'J' } }"),
+        (
+            "revolute",
+            0,
+            0,
+            0.5,
+            0,
+            "{ mass = 'm2', com = ['r - 0.5', 0, 0], inertia = { zz = 'J' } }",
+        ),
     ],
 )
 TURRET = arm(
     "turret",
-    dict(m2=2.1, m3=0.8, a=0.16, Az=0.07, Bx=0.012, By=0.05, Bz=0.055, Cx=0.003, Cy=0.012, Cz=0.014),
+    dict(
+        m2=2.1, m3=0.8, a=0.16, Az=0.07, Bx=0.012, By=0.05, Bz=0.055, Cx=0.003, Cy=0.012, Cz=0.014
+    ),
     [
         ("revolute", 0, 0.4, 0, "'pi/2'", "{ mass = 1, com = [0, 0, 0], inertia = { yy = 'Az' } }"),
         (
@@ -55,8 +66,22 @@ SHOULDER = arm(
     dict(e=0.13, a2=0.41, m2=2.3, m3=1.2, r2=0.19, r3=0.16, A=0.05, B=0.04, D=0.016),
     [
         ("revolute", 0, 0, 0, "'pi/2'", "{ mass = 1, com = [0, 0, 0], inertia = { yy = 'A' } }"),
-        ("revolute", 0, "'e'", "'a2'", 0, "{ mass = 'm2', com = ['r2 - a2', 0, 0], inertia = { yy = 'B', zz = 'B' } }"),
-        ("revolute", 0, 0, 0.3, 0, "{ mass = 'm3', com = ['r3 - 0.3', 0, 0], inertia = { yy = 'D', zz = 'D' } }"),
+        (
+            "revolute",
+            0,
+            "'e'",
+            "'a2'",
+            0,
+            "{ mass = 'm2', com = ['r2 - a2', 0, 0], inertia = { yy = 'B', zz = 'B' } }",
+        ),
+        (
+            "revolute",
+            0,
+            0,
+            0.3,
+            0,
+            "{ mass = 'm3', com = ['r3 - 0.3', 0, 0], inertia = { yy = 'D', zz = 'D' } }",
+        ),
     ],
 )
 WITH_TOOL = arm(
@@ -97,7 +122,13 @@ CASES = [
     # the angular velocity has the axes of the column: all of Bz and Cz, nothing of Bx and Cx
     (
         TURRET,
-        {"M": [["Az + Bz + Cz + (m2*a^2 + m3*q3^2)*c2^2", 0, 0], [0, "By + Cy + m2*a^2 + m3*q3^2", 0], [0, 0, "m3"]]},
+        {
+            "M": [
+                ["Az + Bz + Cz + (m2*a^2 + m3*q3^2)*c2^2", 0, 0],
+                [0, "By + Cy + m2*a^2 + m3*q3^2", 0],
+                [0, 0, "m3"],
+            ]
+        },
         "omega_unturned",
     ),
     # the offset lies on the other side
@@ -107,7 +138,11 @@ CASES = [
         "parameter_sign",
     ),
     # the tool's offset is added in the axes of the world
-    (WITH_TOOL, {"T14": "a1*c1 + a2*c12 + u", "T24": "a1*s1 + a2*s12 + v"}, "translations_unrotated"),
+    (
+        WITH_TOOL,
+        {"T14": "a1*c1 + a2*c12 + u", "T24": "a1*s1 + a2*s12 + v"},
+        "translations_unrotated",
+    ),
     (
         CRANE,
         {
@@ -163,7 +198,12 @@ def test_squares_of_absolute_rates_have_an_index():
         f"(m1 + m2)*l1^2*phi1dd + {inertial}*phi2dd {{}} + (m1 + m2)*g*l1*sin(phi1)",
         f"m2*l2^2*phi2dd + {inertial}*phi1dd {{}} + m2*g*l2*sin(phi2)",
     ]
-    names = {"q": ["phi1", "phi2"], "qd": ["phi1d", "phi2d"], "qdd": ["phi1dd", "phi2dd"], "angles": "absolute"}
+    names = {
+        "q": ["phi1", "phi2"],
+        "qd": ["phi1d", "phi2d"],
+        "qdd": ["phi1dd", "phi2dd"],
+        "angles": "absolute",
+    }
     right = [tau[0].format(f"+ {turning}*phi2d^2"), tau[1].format(f"- {turning}*phi1d^2")]
     wrong = [tau[0].format(f"- {turning}*phi1d^2"), tau[1].format(f"+ {turning}*phi2d^2")]
     assert SWING.grade({"tau": right}, names=names).verdict.passes
@@ -173,6 +213,14 @@ def test_squares_of_absolute_rates_have_an_index():
     entry = report.entries[0]
     assert entry.difference == "m2*l1*l2*sin(q2 - q1)*qd1^2 + m2*l1*l2*sin(q2 - q1)*qd2^2"
     values = dict(entry.witness.state)
-    plain = wrong[0].replace("phi1dd", "qdd1").replace("phi2dd", "qdd2").replace("phi1d", "qd1").replace("phi2d", "qd2")
+    plain = (
+        wrong[0]
+        .replace("phi1dd", "qdd1")
+        .replace("phi2dd", "qdd2")
+        .replace("phi1d", "qd1")
+        .replace("phi2d", "qd2")
+    )
     plain = plain.replace("phi1", "q1").replace("phi2", "q2").replace("^", "**")
-    assert eval(plain, {"sin": math.sin, "cos": math.cos}, values) == pytest.approx(entry.witness.answer, rel=1e-9)
+    assert eval(plain, {"sin": math.sin, "cos": math.cos}, values) == pytest.approx(
+        entry.witness.answer, rel=1e-9
+    )

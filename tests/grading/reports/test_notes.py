@@ -33,14 +33,23 @@ def test_notes_are_data(listed):
     [
         (Note(NoteKind.AGREES, "tau", ("M", "h", "g")), "tau is what the sheet's own M, h, g give"),
         (Note(NoteKind.DISAGREES, "J", ("T",)), "J is not the Jacobian of the sheet's own T"),
-        (Note(NoteKind.NUMBERS, "M", ("l1 = 0.5", "l2 = 0.4")), "M: judged at the file's numbers: l1 = 0.5, l2 = 0.4"),
+        (
+            Note(NoteKind.NUMBERS, "M", ("l1 = 0.5", "l2 = 0.4")),
+            "M: judged at the file's numbers: l1 = 0.5, l2 = 0.4",
+        ),
         (Note(NoteKind.TAKEN_FOR, values=("L_1", "l1")), "'L_1' was read as l1"),
-        (Note(NoteKind.UP_TO_A_CONSTANT, "V"), "V and L count from any zero: V is right up to a constant"),
+        (
+            Note(NoteKind.UP_TO_A_CONSTANT, "V"),
+            "V and L count from any zero: V is right up to a constant",
+        ),
         (
             Note(NoteKind.SOLUTIONS_MISSING, "ik", ("3", "8")),
             "ik: the branches give 3 of the 8 solutions that the arm has in general",
         ),
-        (Note(NoteKind.PROGRAM, values=("line 3: Mass is read as M",)), "line 3: Mass is read as M"),
+        (
+            Note(NoteKind.PROGRAM, values=("line 3: Mass is read as M",)),
+            "line 3: Mass is read as M",
+        ),
     ],
 )
 def test_what_notes_say(note, sentence):

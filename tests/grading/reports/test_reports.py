@@ -32,7 +32,9 @@ from dhkit.grading.rubric import Rubric
 from grading.judged import REPORT, anything, reports
 
 MARKS = marks(REPORT, Rubric())
-BROKEN = GradeReport(sheet="class/bob.toml", student="bob", error="class/bob.toml: no TOML", version="0.1.0")
+BROKEN = GradeReport(
+    sheet="class/bob.toml", student="bob", error="class/bob.toml: no TOML", version="0.1.0"
+)
 HOSTILE = "<script>alert(1)</script>\"'&\x1b[31m[bold red]\u202e=cmd()"
 TAGS = re.compile(
     "html|head|meta|title|style|body|h1|h2|h3|p|span|div|table|tr|th|td|section|article|details|summary|a|i|code|"
@@ -66,7 +68,9 @@ class Tags(html.parser.HTMLParser):
 def hostile(report):
     """The report with a hostile text wherever a text may be."""
     return report_of(
-        json.dumps(report.data()).replace('"m1*l1^2/3"', json.dumps(HOSTILE)).replace('"ada"', json.dumps(HOSTILE))
+        json.dumps(report.data())
+        .replace('"m1*l1^2/3"', json.dumps(HOSTILE))
+        .replace('"ada"', json.dumps(HOSTILE))
     )
 
 
@@ -84,7 +88,10 @@ def test_the_terminal_shows_what_is_wrong():
 @given(reports(anything))
 def test_nothing_commands_the_terminal(report):
     given = marks(report, Rubric())
-    for text in (rendered(terminal_report(report, given)), rendered(terminal_class([report], [given]))):
+    for text in (
+        rendered(terminal_report(report, given)),
+        rendered(terminal_class([report], [given])),
+    ):
         assert all(character.isprintable() or character == "\n" for character in text)
 
 
@@ -173,7 +180,9 @@ def test_junit():
         "errors": "0",
         "skipped": "1",
     }
-    assert ada.find("testcase[@name='g1']/failure").get("message") == "g1: gravity has the wrong sign"
+    assert (
+        ada.find("testcase[@name='g1']/failure").get("message") == "g1: gravity has the wrong sign"
+    )
     assert bob.get("errors") == "1"
     assert ada.find("properties/property[@name='digest']").get("value") == "abc123"
 
@@ -183,7 +192,10 @@ def test_junit_is_xml_whatever_a_sheet_holds(report):
     ET.fromstring(junit([report], [marks(report, Rubric())]).encode())
 
 
-@given(st.lists(reports(anything), min_size=1, max_size=2), st.sampled_from(("full", "hint", "verdict")))
+@given(
+    st.lists(reports(anything), min_size=1, max_size=2),
+    st.sampled_from(("full", "hint", "verdict")),
+)
 def test_pages_hold_known_elements_alone(several, level):
     told = [with_feedback(report, level) for report in several]
     given = [marks(report, Rubric()) for report in several]
@@ -230,15 +242,29 @@ def test_mathml_is_mathematics_or_nothing(latex):
 
 @given(reports(anything))
 def test_csv_holds_no_formula(report):
-    rows = list(csv.reader(io.StringIO(marks_csv([report, REPORT], [marks(report, Rubric()), MARKS]))))
+    rows = list(
+        csv.reader(io.StringIO(marks_csv([report, REPORT], [marks(report, Rubric()), MARKS])))
+    )
     assert len({len(row) for row in rows}) == 1
     for text in (text for row in rows for text in row):
-        assert not text.startswith(("=", "+", "-", "@", "\t", "\r")) or re.fullmatch(r"[+-]?\d.*", text)
+        assert not text.startswith(("=", "+", "-", "@", "\t", "\r")) or re.fullmatch(
+            r"[+-]?\d.*", text
+        )
 
 
 def test_csv():
-    rows = list(csv.DictReader(io.StringIO(marks_csv([REPORT, BROKEN], [MARKS, marks(BROKEN, Rubric())]))))
+    rows = list(
+        csv.DictReader(io.StringIO(marks_csv([REPORT, BROKEN], [MARKS, marks(BROKEN, Rubric())])))
+    )
     assert rows[0]["student"] == "ada"
     assert (rows[0]["points"], rows[0]["M"], rows[0]["g"]) == ("62.5", "50", "12.5")
-    assert (rows[1]["points"], rows[1]["M"], rows[1]["error"]) == ("0", "", "class/bob.toml: no TOML")
-    assert (rows[0]["robot"], rows[0]["digest"], rows[0]["version"]) == ("planar2r", "abc123", "0.1.0")
+    assert (rows[1]["points"], rows[1]["M"], rows[1]["error"]) == (
+        "0",
+        "",
+        "class/bob.toml: no TOML",
+    )
+    assert (rows[0]["robot"], rows[0]["digest"], rows[0]["version"]) == (
+        "planar2r",
+        "abc123",
+        "0.1.0",
+    )

@@ -23,7 +23,9 @@ def test_library_robots(name):
     assert str(Arm.load(name).family) == EXPECTED[name]
 
 
-@pytest.mark.parametrize("name", ["planar2r", "planar3r", "cobra600", "polar_rp", "cart_pendulum", "pan_tilt", "al5d"])
+@pytest.mark.parametrize(
+    "name", ["planar2r", "planar3r", "cobra600", "polar_rp", "cart_pendulum", "pan_tilt", "al5d"]
+)
 def test_arms_of_few_joints_say_what_they_meet(name):
     words = Arm.load(name).family.words
     assert "closed form" in words
@@ -33,7 +35,10 @@ def test_arms_of_few_joints_say_what_they_meet(name):
 def rows(right=np.pi / 2, tilt=0.0):
     alphas = [right, tilt, -right, right, -right, 0]
     return [
-        (0, d, a, x) for d, a, x in zip([0.6, 0, 0.15, 0.43, 0, 0.1], [0, 0.43, 0.02, 0, 0, 0], alphas, strict=True)
+        (0, d, a, x)
+        for d, a, x in zip(
+            [0.6, 0, 0.15, 0.43, 0, 0.1], [0, 0.43, 0.02, 0, 0, 0], alphas, strict=True
+        )
     ]
 
 
@@ -53,7 +58,9 @@ def test_a_tilt_beyond_the_tolerance_ends_the_family():
 
 def test_base_tool_units_and_convention_change_nothing():
     arm = Arm.load("kr5")
-    moved = arm.with_base(pose((1, 2, 3), euler=(0.1, 0.2, 0.3))).with_tool(pose((0.1, 0, 0.2), euler=(1, 2, 3)))
+    moved = arm.with_base(pose((1, 2, 3), euler=(0.1, 0.2, 0.3))).with_tool(
+        pose((0.1, 0, 0.2), euler=(1, 2, 3))
+    )
     assert str(moved.family) == str(arm.family) == SPHERICAL
     locked = Arm.load("panda").lock({2: 0.0})  # without its third joint axes 2 and 4 are parallel
     assert "6R" in str(locked.family)

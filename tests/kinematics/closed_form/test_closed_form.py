@@ -16,7 +16,16 @@ from dhkit.kinematics import (
 from dhkit.kinematics.closed_form.classify import FAMILIES
 from dhkit.kinematics.singularities import measures as singularity_measures, singular_configurations
 from dhkit.verification import random_states
-from ik_checks import FAMILY_A, FAMILY_B, FEW_JOINTS, SIX_JOINTS, along_plane, closure, gaps, measures
+from ik_checks import (
+    FAMILY_A,
+    FAMILY_B,
+    FEW_JOINTS,
+    SIX_JOINTS,
+    along_plane,
+    closure,
+    gaps,
+    measures,
+)
 from random_arms import elbow_arms, few_joint_arms, slide_arms, states, three_parallel_arms
 
 CLOSES = 1e-12
@@ -63,8 +72,15 @@ def test_the_original_is_among_the_branches_and_they_are_distinct(name, law):
         q = q[regular(arm, q)]
         solutions = inverse_kinematics(arm, forward_kinematics(arm, q))
         nearest = np.nanmin(gaps(arm, solutions.q, q[:, None]), axis=-1)
-        law.holds("the original among the branches", float(nearest.max()), FOUND, (name, q[nearest.argmax()]))
-        one_shoulder = along_plane(arm, q) < REGULAR  # of an arm with an offset: left and right are then the same
+        law.holds(
+            "the original among the branches",
+            float(nearest.max()),
+            FOUND,
+            (name, q[nearest.argmax()]),
+        )
+        one_shoulder = (
+            along_plane(arm, q) < REGULAR
+        )  # of an arm with an offset: left and right are then the same
         for i in range(8):
             for j in range(i):
                 apart = gaps(arm, solutions.q[:, i], solutions.q[:, j])
@@ -98,23 +114,40 @@ def test_every_branch_closes_at_singularities_and_is_flagged(name, kind, law):
     for start in range(0, total, CHUNK):
         count = min(CHUNK, total - start)
         q = singular_configurations(arm, kind, count, seed=start)
-        for size in (0.0, NEAR / 6):  # six joints together then miss the singularity by at most NEAR
+        for size in (
+            0.0,
+            NEAR / 6,
+        ):  # six joints together then miss the singularity by at most NEAR
             near = q + size * rng.uniform(-1, 1, q.shape)
             if kind != "shoulder":
                 assert measures(arm, near)[kind].max() < 2 * NEAR
             T = forward_kinematics(arm, near)
             for seed in (None, near):
                 solutions = inverse_kinematics(arm, T, seed=seed)
-                law.holds("closure at a singularity", closure(arm, solutions, T), required(name), (name, kind))
+                law.holds(
+                    "closure at a singularity",
+                    closure(arm, solutions, T),
+                    required(name),
+                    (name, kind),
+                )
                 flagged = (solutions.valid & (solutions.flags & IKFlag[kind] > 0)).any(axis=-1)
                 unsolved = ~solutions.valid.any(axis=-1)
                 ur = name in FAMILY_B
-                law.holds("share not solved at a singularity", unsolved.mean(), UNSOLVED if ur else 0.0, (name, kind))
-                law.holds("share not flagged", (~flagged).mean(), UNFLAGGED if ur else 0.0, (name, kind))
+                law.holds(
+                    "share not solved at a singularity",
+                    unsolved.mean(),
+                    UNSOLVED if ur else 0.0,
+                    (name, kind),
+                )
+                law.holds(
+                    "share not flagged", (~flagged).mean(), UNFLAGGED if ur else 0.0, (name, kind)
+                )
 
 
 @pytest.mark.parametrize("name", FAMILY_B)
-@pytest.mark.parametrize(("elbow", "wrist"), [(1e-5, 1e-5), (1e-6, 1e-6), (1e-8, 1e-6), (1e-6, 1e-9), (1e-7, 1e-12)])
+@pytest.mark.parametrize(
+    ("elbow", "wrist"), [(1e-5, 1e-5), (1e-6, 1e-6), (1e-8, 1e-6), (1e-6, 1e-9), (1e-7, 1e-12)]
+)
 def test_a_stretched_arm_whose_wrist_is_nearly_straight_is_reached(name, elbow, wrist):
     """Rounding of a pose decides there how links 2 to 4 turn together, for the wrist with a flip and without."""
     arm = library_robot(name)
@@ -125,7 +158,9 @@ def test_a_stretched_arm_whose_wrist_is_nearly_straight_is_reached(name, elbow, 
     T = forward_kinematics(arm, q)
     solutions = inverse_kinematics(arm, T)
     # Joints 1 and 5 are well determined, and tell shoulder and flip; joint 6 is nearly free.
-    apart = np.abs(np.remainder(solutions.q - q[:, None] + np.pi, 2 * np.pi) - np.pi)[..., [0, 4]].max(axis=-1)
+    apart = np.abs(np.remainder(solutions.q - q[:, None] + np.pi, 2 * np.pi) - np.pi)[
+        ..., [0, 4]
+    ].max(axis=-1)
     original = solutions.valid & (apart < FOUND)
     assert original.any(axis=1).all()
     assert closure(arm, solutions, T) < OTHERS_CLOSE
@@ -189,7 +224,10 @@ def check_family(law, arm, names, tolerance):
     assume(found.family is not None or not arm.numbers.prismatic[1:3].any() or arm.n == 6)
     assert found.family is not None, found.words
     assert found.family.name in names, found.words
-    assume(min(float(np.min(found.fit.parameters.get(key, 1.0))) for key in ("L2", "L3", "L")) > 1e-3 * arm.reach)
+    assume(
+        min(float(np.min(found.fit.parameters.get(key, 1.0))) for key in ("L2", "L3", "L"))
+        > 1e-3 * arm.reach
+    )
     q = random_states(arm, 50)
     T = world_to_tool(arm, q)
     solutions = inverse_kinematics(arm, T)
@@ -197,10 +235,15 @@ def check_family(law, arm, names, tolerance):
     reach = arm.reach or 1.0
     scale = reach + np.abs(T[:, :3, 3]).max()
     law.holds(
-        "closure of every branch", closure(arm, solutions, T, fk=world_to_tool) * reach / scale, tolerance, found.words
+        "closure of every branch",
+        closure(arm, solutions, T, fk=world_to_tool) * reach / scale,
+        tolerance,
+        found.words,
     )
     singular = (solutions.flags & (IKFlag.shoulder | IKFlag.elbow | IKFlag.wrist)).any(axis=-1)
-    nearest = np.where(singular, 0.0, np.nanmin(gaps(arm, solutions.q, q[:, None]), axis=-1, initial=np.inf))
+    nearest = np.where(
+        singular, 0.0, np.nanmin(gaps(arm, solutions.q, q[:, None]), axis=-1, initial=np.inf)
+    )
     law.holds("the original among the branches", float(nearest.max()), 1e-4, found.words)
 
 
@@ -211,7 +254,9 @@ def test_any_arm_of_the_pumas_family(law, arm):
 
 @given(arm=three_parallel_arms())
 def test_any_arm_of_the_urs_family(law, arm):
-    check_family(law, arm, ["three_parallel", "elbow_wrist"], OTHERS_CLOSE)  # without d5 the wrist is spherical
+    check_family(
+        law, arm, ["three_parallel", "elbow_wrist"], OTHERS_CLOSE
+    )  # without d5 the wrist is spherical
 
 
 @given(arm=slide_arms())

@@ -38,7 +38,9 @@ def poses_beyond(arm, rng, count):
 
     A Stanford arm, whose boom has any length, reaches all but points near axis 1.
     """
-    spread = np.array([0.15, 0.15, 1.0]) if arm.description.numbers.prismatic.any() else np.full(3, 1.5)
+    spread = (
+        np.array([0.15, 0.15, 1.0]) if arm.description.numbers.prismatic.any() else np.full(3, 1.5)
+    )
     zero = np.zeros(arm.n)
     t_tool_wrist = (np.linalg.inv(arm.fk(zero)) @ np.r_[wrist_centres(arm, zero), 1])[:3]
     wanted = rng.uniform(-1, 1, (count, 3)) * spread

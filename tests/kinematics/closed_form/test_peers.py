@@ -45,7 +45,9 @@ def test_eaik_finds_the_same_solutions(name, law):
     contender = next(x for x in eaik.contenders() if x.name == eaik.SINGLE)
     for k, theirs in enumerate(solutions_of(contender, arm, q)):
         ours = solutions.q[k][solutions.valid[k]]
-        law.holds("distance of the sets of solutions to EAIK's", away(ours, theirs), SAME, (name, q[k]))
+        law.holds(
+            "distance of the sets of solutions to EAIK's", away(ours, theirs), SAME, (name, q[k])
+        )
 
 
 def test_ssik_finds_the_same_solutions(law):
@@ -59,7 +61,9 @@ def test_ssik_finds_the_same_solutions(law):
         for k in range(len(q)):
             found = theirs.q[k][theirs.valid[k]]
             ours = solutions.q[k][solutions.valid[k]]
-            law.holds("distance of the sets of solutions to ssik's", away(ours, found), SAME, (name, q[k]))
+            law.holds(
+                "distance of the sets of solutions to ssik's", away(ours, found), SAME, (name, q[k])
+            )
 
 
 def test_stanford_has_no_solution_that_newton_steps_find_beside_ours(law):

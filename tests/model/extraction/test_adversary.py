@@ -25,8 +25,21 @@ def link(name: str, inner: str = "") -> str:
     return f'<link name="{name}">{inner}</link>'
 
 
-def joint(name, parent, child, *, kind="revolute", xyz="0.3 0 0.1", rpy="0.2 0 0", axis="0 0 1", limit=LIMIT, more=""):
-    origin = f'<origin xyz="{xyz}" rpy="{rpy}"/>' if rpy is not None else f'<origin xyz="{xyz}" {more}/>'
+def joint(
+    name,
+    parent,
+    child,
+    *,
+    kind="revolute",
+    xyz="0.3 0 0.1",
+    rpy="0.2 0 0",
+    axis="0 0 1",
+    limit=LIMIT,
+    more="",
+):
+    origin = (
+        f'<origin xyz="{xyz}" rpy="{rpy}"/>' if rpy is not None else f'<origin xyz="{xyz}" {more}/>'
+    )
     inner = "" if rpy is None else more
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{origin}'
@@ -40,7 +53,9 @@ def robot(*parts: str, version: str = "1.0") -> str:
 
 def chain(count: int, kinds: str = "revolute", **options) -> str:
     links = [link(f"l{k}") for k in range(count + 1)]
-    return robot(*links, *(joint(f"j{k}", f"l{k}", f"l{k + 1}", kind=kinds, **options) for k in range(count)))
+    return robot(
+        *links, *(joint(f"j{k}", f"l{k}", f"l{k + 1}", kind=kinds, **options) for k in range(count))
+    )
 
 
 @pytest.fixture
@@ -81,7 +96,9 @@ def test_limits_do_not_decide_what_a_table_is_held_to(limits, file):
     assert truth(path, extraction.description) < 1e-9
     assert extraction.residual.tool < 1e-9
     assert "zero" not in extraction.description.configurations
-    assert extraction.description.numbers.configurations["middle"][0] == pytest.approx((low + high) / 2)
+    assert extraction.description.numbers.configurations["middle"][0] == pytest.approx(
+        (low + high) / 2
+    )
 
 
 def test_a_long_rail_is_sampled_along_its_stroke(file):
@@ -114,9 +131,13 @@ def test_a_file_that_pinocchio_reads_otherwise_is_no_arm(file, monkeypatch):
 
     path = file(robot(link("a"), link("b"), joint("j", "a", "b", rpy="1.5708 0 0")))
     product = residual.tip_in_base
-    monkeypatch.setattr(residual, "tip_in_base", lambda chain, q: product(chain, q) @ np.diag([1.0, -1, -1, 1]))
+    monkeypatch.setattr(
+        residual, "tip_in_base", lambda chain, q: product(chain, q) @ np.diag([1.0, -1, -1, 1])
+    )
     for as_designed in (False, True):
-        with pytest.raises(ModelError, match="Pinocchio puts the tool 2 away from where dhkit reads it"):
+        with pytest.raises(
+            ModelError, match="Pinocchio puts the tool 2 away from where dhkit reads it"
+        ):
             extract_dh(path, as_designed=as_designed)
 
 
@@ -159,7 +180,10 @@ def test_a_turned_base_makes_no_false_differences(file):
     assert report.ok
     assert not any("axis" in note or "turned" in note for note in report.notes), report.notes
     heavy = file(
-        text.replace('<link name="c"><inertial><mass value="1"/>', '<link name="c"><inertial><mass value="2"/>')
+        text.replace(
+            '<link name="c"><inertial><mass value="1"/>',
+            '<link name="c"><inertial><mass value="2"/>',
+        )
     )
     report = verify_urdf(arm.description, heavy, "c", samples=20, base="torso")
     assert any("mass is 2 kg" in note for note in report.notes), report.notes
@@ -185,7 +209,9 @@ def test_what_rounds_or_cuts_a_multiple_of_15_degrees_is_read_as_it(word, file):
     assert f"read as {READ[word]} degrees" in change
 
 
-@pytest.mark.parametrize("dynamics", ['damping="-3"', 'friction="-2"', 'damping="-1" friction="-2"'])
+@pytest.mark.parametrize(
+    "dynamics", ['damping="-3"', 'friction="-2"', 'damping="-1" friction="-2"']
+)
 def test_negative_friction_is_refused(dynamics, file):
     text = robot(link("a"), link("b"), joint("j", "a", "b", more=f"<dynamics {dynamics}/>"))
     with pytest.raises(ModelError, match="expected none below 0"):
@@ -193,12 +219,18 @@ def test_negative_friction_is_refused(dynamics, file):
 
 
 def test_a_gripper_of_one_finger_and_its_mimic_is_not_the_arm(file):
-    fingers = [joint("c", "hand", "c"), joint("d", "hand", "d", more='<mimic joint="c" offset="0.5"/>')]
+    fingers = [
+        joint("c", "hand", "c"),
+        joint("d", "hand", "d", more='<mimic joint="c" offset="0.5"/>'),
+    ]
     text = robot(link("a"), link("hand"), link("c"), link("d"), joint("j", "a", "hand"), *fingers)
-    with pytest.raises(ModelError, match=r"chains end at hand \(1 joint\), c \(2 joints\); choose one"):
+    with pytest.raises(
+        ModelError, match=r"chains end at hand \(1 joint\), c \(2 joints\); choose one"
+    ):
         extract_dh(file(text))
     assert any(
-        "'d' follows 'c' in the file; here it stands at zero" in n for n in extract_dh(file(text), tip="c").notes
+        "'d' follows 'c' in the file; here it stands at zero" in n
+        for n in extract_dh(file(text), tip="c").notes
     )
 
 
@@ -207,7 +239,9 @@ def test_mesh_names_that_no_file_has_are_left_out(name, file, tmp_path):
     (tmp_path / "loop.stl").symlink_to("loop.stl")
     visual = f'<visual><geometry><mesh filename="{name}"/></geometry></visual>'
     extraction = extract_dh(file(robot(link("a"), link("b", visual), joint("j", "a", "b"))))
-    assert any(note.startswith("link 'b': mesh") and note.endswith("left out") for note in extraction.notes)
+    assert any(
+        note.startswith("link 'b': mesh") and note.endswith("left out") for note in extraction.notes
+    )
 
 
 def test_mesh_names_that_a_robot_file_does_not_take_are_left_out(file, tmp_path):
@@ -227,14 +261,21 @@ def test_mesh_names_that_a_robot_file_does_not_take_are_left_out(file, tmp_path)
     ],
 )
 def test_shapes_of_odd_sizes_are_left_out(shape, file):
-    extraction = extract_dh(file(robot(link("a"), link("b", f"<visual>{shape}</visual>"), joint("j", "a", "b"))))
-    assert any("link 'b': visual is larger than 1e+06 m or farther away; left out" in n for n in extraction.notes)
+    extraction = extract_dh(
+        file(robot(link("a"), link("b", f"<visual>{shape}</visual>"), joint("j", "a", "b")))
+    )
+    assert any(
+        "link 'b': visual is larger than 1e+06 m or farther away; left out" in n
+        for n in extraction.notes
+    )
 
 
 def test_names_that_clash_after_cleaning_are_told_apart(file):
     links = [link(name) for name in "abcd"]
     names = ["a_b_3", "a b", "a_b", "a/b"]
-    text = robot(*links, link("e"), *(joint(n, p, c) for n, p, c in zip(names, "abcd", "bcde", strict=True)))
+    text = robot(
+        *links, link("e"), *(joint(n, p, c) for n, p, c in zip(names, "abcd", "bcde", strict=True))
+    )
     found = [one.name for one in extract_dh(file(text)).description.joints]
     assert len(set(found)) == 4
     assert found[:2] == ["a_b_3", "a_b"]
@@ -299,7 +340,9 @@ def test_axes_of_any_length_are_directions(axis, file):
     assert any("axis has length" in note for note in extraction.notes)
 
 
-@pytest.mark.parametrize("xyz", ["٠.٤ 0 0", "０.4 0 0", ".4\u00a00\u00a00", "0x1 0 0", "1e99999 0 0"])
+@pytest.mark.parametrize(
+    "xyz", ["٠.٤ 0 0", "０.4 0 0", ".4\u00a00\u00a00", "0x1 0 0", "1e99999 0 0"]
+)
 def test_only_ascii_numbers_are_numbers(xyz, file):
     with pytest.raises(ModelError, match="expected a finite number"):
         extract_dh(file(robot(link("a"), link("b"), joint("j", "a", "b", xyz=xyz))))
@@ -314,7 +357,10 @@ def test_infinite_effort_is_unlimited(file):
 
 def test_hints_for_xacro(file):
     for text, hint in (
-        ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "has elements of xacro; run xacro on it first"),
+        (
+            '<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>',
+            "has elements of xacro; run xacro on it first",
+        ),
         (robot(link("a"), link("b"), joint("j", "a", "b", xyz="${l1} 0 0")), "run xacro first"),
     ):
         with pytest.raises(ModelError, match=hint.replace("$", r"\$")):
@@ -324,7 +370,11 @@ def test_hints_for_xacro(file):
 def test_a_parallel_table_is_parallel(file):
     path = file(
         robot(
-            link("a"), link("b"), link("c"), joint("j", "a", "b"), joint("k", "b", "c", xyz="0.4 0 0", rpy="2e-11 0 0")
+            link("a"),
+            link("b"),
+            link("c"),
+            joint("j", "a", "b"),
+            joint("k", "b", "c", xyz="0.4 0 0", rpy="2e-11 0 0"),
         )
     )
     extraction = extract_dh(path)
@@ -336,7 +386,10 @@ def test_links_given_twice_are_said(file, capsys):
     from dhkit.cli import main
 
     path = file(robot(link("a"), link("b"), joint("j", "a", "b")))
-    for arguments in (["extract", f"{path}#b", "--tip", "a"], ["extract", str(path), "--base", "", "--tip", "b"]):
+    for arguments in (
+        ["extract", f"{path}#b", "--tip", "a"],
+        ["extract", str(path), "--base", "", "--tip", "b"],
+    ):
         with pytest.raises((SystemExit, DhkitError)) as stopped:
             main(arguments)
         assert stopped.value.code == 2

@@ -22,8 +22,19 @@ def link(name: str, mass: float = 1.0, shape: str = "") -> str:
     )
 
 
-def joint(name: str, parent: str, child: str, kind: str = "revolute", axis: str = "0 1 0", rpy: str = "0.3 0 0") -> str:
-    limit = '<limit lower="-1" upper="2" effort="7" velocity="3"/>' if kind in ("revolute", "prismatic") else ""
+def joint(
+    name: str,
+    parent: str,
+    child: str,
+    kind: str = "revolute",
+    axis: str = "0 1 0",
+    rpy: str = "0.3 0 0",
+) -> str:
+    limit = (
+        '<limit lower="-1" upper="2" effort="7" velocity="3"/>'
+        if kind in ("revolute", "prismatic")
+        else ""
+    )
     friction = '<dynamics damping="0.5" friction="0.2"/>' if name == "elbow" else ""
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
@@ -36,7 +47,9 @@ TREE = (
     '<robot name="two_arms">'
     + "".join(
         link(name, 1 + k, BOX)
-        for k, name in enumerate(["pelvis", "torso", "upper", "fore", "hand", "thumb", "head", "camera", "left"])
+        for k, name in enumerate(
+            ["pelvis", "torso", "upper", "fore", "hand", "thumb", "head", "camera", "left"]
+        )
     )
     + joint("waist", "pelvis", "torso", "prismatic", "0 0 1", "0.2 0.4 0")
     + joint("shoulder", "torso", "upper")
@@ -65,7 +78,8 @@ def reduced(path, kept):
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize(
-    ("base", "tip"), [("pelvis", "hand"), ("torso", "hand"), ("upper", "thumb"), ("torso", "camera")]
+    ("base", "tip"),
+    [("pelvis", "hand"), ("torso", "hand"), ("upper", "thumb"), ("torso", "camera")],
 )
 def test_a_chain_is_the_reduced_model(tree, base, tip, convention, law):
     extraction = extract_dh(tree, base, tip, convention=convention)
@@ -77,9 +91,13 @@ def test_a_chain_is_the_reduced_model(tree, base, tip, convention, law):
         full = pin.neutral(model)
         for name, value in zip(names, q, strict=True):
             one = model.joints[model.getJointId(name)]
-            full[one.idx_q : one.idx_q + one.nq] = [np.cos(value), np.sin(value)] if one.nq == 2 else [value]
+            full[one.idx_q : one.idx_q + one.nq] = (
+                [np.cos(value), np.sin(value)] if one.nq == 2 else [value]
+            )
         pin.framesForwardKinematics(model, data, full)
-        T = (data.oMf[model.getFrameId(base)].inverse() * data.oMf[model.getFrameId(tip)]).homogeneous
+        T = (
+            data.oMf[model.getFrameId(base)].inverse() * data.oMf[model.getFrameId(tip)]
+        ).homogeneous
         law.holds("tool", np.abs(arm.fk(q) - T).max(), 1e-9)
         M = pin.crba(model, data, full)
         M = (np.triu(M) + np.triu(M, 1).T)[np.ix_(order, order)]
@@ -103,7 +121,10 @@ def test_what_hangs_beside_is_carried_along_or_dropped(tree):
     assert frozen.description.numbers.base_body[0] == pytest.approx(2 + 7 + 9)
     assert dropped.description.numbers.mass == pytest.approx([3, 4 + 8, 5])
     assert dropped.description.numbers.base_body[0] == pytest.approx(2)
-    assert any("stand at zero, their links carried along: thumb_joint, neck, left_shoulder" in n for n in frozen.notes)
+    assert any(
+        "stand at zero, their links carried along: thumb_joint, neck, left_shoulder" in n
+        for n in frozen.notes
+    )
     assert any("left out: head, left, thumb" in n for n in dropped.notes)
     assert dropped.residual.largest < 5e-10
     assert len(frozen.description.joints[2].shapes) == 2
@@ -125,7 +146,9 @@ def test_limits_friction_and_shapes_are_the_files(tree):
     from dhkit.description.numbers import matrix
 
     (box, *_), T[2, 3] = found.joints[3].shapes, 0.1
-    assert frame @ matrix(box.placement, {}) == pytest.approx(chain.zero_poses["hand"] @ T, abs=1e-9)
+    assert frame @ matrix(box.placement, {}) == pytest.approx(
+        chain.zero_poses["hand"] @ T, abs=1e-9
+    )
 
 
 @pytest.mark.slow
@@ -147,7 +170,9 @@ def test_several_tips_are_listed_and_none_is_taken_in_silence(tree):
 def test_wrong_links_are_said(tree):
     with pytest.raises(ModelError, match="tip: no link 'x'; it has pelvis, torso"):
         extract_dh(tree, tip="x")
-    with pytest.raises(ModelError, match="base 'head' is not on the way from the root to tip 'hand'"):
+    with pytest.raises(
+        ModelError, match="base 'head' is not on the way from the root to tip 'hand'"
+    ):
         extract_dh(tree, "head", "hand")
     with pytest.raises(ModelError, match="tip 'torso'; swap base and tip"):
         extract_dh(tree, "hand", "torso")
@@ -190,7 +215,9 @@ def test_a_robot_file_takes_its_meshes_along(tmp_path):
     again = read_robot(tmp_path / "puma.toml")
     assert len(files) > 5
     assert again.mesh_folder == tmp_path
-    assert all((tmp_path / shape.geometry.path).is_file() for one in again.joints for shape in one.shapes)
+    assert all(
+        (tmp_path / shape.geometry.path).is_file() for one in again.joints for shape in one.shapes
+    )
     (tmp_path / "file").touch()
     with pytest.raises(ModelError, match=r"Not a directory|File exists"):
         write_robot_with_meshes(puma, tmp_path / "file" / "puma.toml")

@@ -20,7 +20,9 @@ try:
     INSTALLED = version("example-robot-data")
 except PackageNotFoundError:
     INSTALLED = ""
-needed = pytest.mark.skipif(not INSTALLED, reason="example-robot-data is not installed (414 MB, extra robots)")
+needed = pytest.mark.skipif(
+    not INSTALLED, reason="example-robot-data is not installed (414 MB, extra robots)"
+)
 
 AGREED = 1e-9
 """m and rotation entries of the tool, and relative of M and g."""
@@ -33,7 +35,9 @@ CHAINS = 200
 def states(chain, count: int):
     """Return random joint values inside the limits, shape (count, n)."""
     low, high = np.array([one.limits or (-np.pi, np.pi) for one in chain.joints]).T
-    return np.random.default_rng(1).uniform(np.maximum(low, -10), np.minimum(high, 10), (count, len(chain.joints)))
+    return np.random.default_rng(1).uniform(
+        np.maximum(low, -10), np.minimum(high, 10), (count, len(chain.joints))
+    )
 
 
 def compare(chain, description, count: int):
@@ -56,7 +60,8 @@ def compare(chain, description, count: int):
     return (
         tool,
         float(np.abs(dynamics.mass_matrix(description, q) - M).max()) / (scale_M or 1.0),
-        float(np.abs(dynamics.gravity_torque(description, q) - g).max()) / (max(scale_g, 1e-6 * weight) or 1.0),
+        float(np.abs(dynamics.gravity_torque(description, q) - g).max())
+        / (max(scale_g, 1e-6 * weight) or 1.0),
     )
 
 
@@ -78,15 +83,26 @@ def test_all_chains_have_tables(law, convention, capsys):
             if extraction.decimals is None:
                 law.holds("tool, numbers as computed", tool, UNROUNDED, example.name)
             if count == 1000:
-                rounded = "as computed" if extraction.decimals is None else f"{extraction.decimals} decimals"
-                print(f"\n  {example.name:58s} {convention.value:9s} {tool:.1e} {M:.1e} {g:.1e} {rounded}", end="")
+                rounded = (
+                    "as computed"
+                    if extraction.decimals is None
+                    else f"{extraction.decimals} decimals"
+                )
+                print(
+                    f"\n  {example.name:58s} {convention.value:9s} {tool:.1e} {M:.1e} {g:.1e} {rounded}",
+                    end="",
+                )
 
 
 @needed
 def test_arms_load_by_name_and_work():
     arm = Arm.load("example:ur5")
     assert arm.n == 6
-    assert "spherical" in str(arm.family) or "parallel" in str(arm.family) or "UR" in str(arm.family).upper()
+    assert (
+        "spherical" in str(arm.family)
+        or "parallel" in str(arm.family)
+        or "UR" in str(arm.family).upper()
+    )
     T = arm.fk([0.1, -1, 1.2, -0.5, 0.7, 0.2])
     assert arm.ik(T).valid.any()
     assert arm.verify(samples=20).ok
@@ -99,7 +115,9 @@ def test_arms_load_by_name_and_work():
 @needed
 def test_names_are_unique_and_the_empty_robot_is_left_out():
     robots = example_robots()
-    assert {"ur3", "ur5", "anymal_b_simple", "anymal_c_simple", "panda", "talos_left_arm"} <= set(robots)
+    assert {"ur3", "ur5", "anymal_b_simple", "anymal_c_simple", "panda", "talos_left_arm"} <= set(
+        robots
+    )
     assert example_urdf("ur3").name == "ur3_robot.urdf"
     names = [chain.name for chain in example_chains()]
     assert len(set(names)) == len(names)
@@ -116,7 +134,9 @@ def test_without_the_package_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setattr(sys.modules["dhkit.model.example_robots"], "distribution", missing)
     module.cache_clear()
     try:
-        with pytest.raises(ModelError, match="example-robot-data is not installed; pip install example-robot-data"):
+        with pytest.raises(
+            ModelError, match="example-robot-data is not installed; pip install example-robot-data"
+        ):
             Arm.load("example:ur5")
     finally:
         module.cache_clear()

@@ -36,7 +36,11 @@ def with_rounded_angles(text, decimals):
 
 
 def library_urdfs():
-    return [(name, asset(f"urdf/{name}.urdf"), None, None) for name in robots() if library_robot(name).n > 1]
+    return [
+        (name, asset(f"urdf/{name}.urdf"), None, None)
+        for name in robots()
+        if library_robot(name).n > 1
+    ]
 
 
 def example_urdfs():
@@ -59,11 +63,17 @@ def test_tables_of_rounded_files_are_as_large_as_the_arm(law, decimals, tmp_path
         path_to_tip = chain.tree.joints_to(chain.tip, chain.base)
         own = max(float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in path_to_tip)
         longest = float(max(np.abs(arm.numbers.a).max(), np.abs(arm.numbers.d).max()))
-        law.holds("largest length over the file's own", longest / own if own else longest, LENGTHS, name)
+        law.holds(
+            "largest length over the file's own", longest / own if own else longest, LENGTHS, name
+        )
         original = Original(chain)
-        off = np.linalg.norm((world_to_tool(arm, original.q) - original.tool)[:, :3, 3], axis=1).max()
+        off = np.linalg.norm(
+            (world_to_tool(arm, original.q) - original.tool)[:, :3, 3], axis=1
+        ).max()
         rounding = 10.0**-decimals * max(arm.reach, original.size)
-        law.holds("residual over reach times a unit of the last decimal", float(off) / rounding, 1.0, name)
+        law.holds(
+            "residual over reach times a unit of the last decimal", float(off) / rounding, 1.0, name
+        )
 
 
 @pytest.mark.parametrize("name", ["ur5", slow_if(True, "panda"), slow_if(True, "irb140")])
@@ -87,7 +97,11 @@ def test_what_is_computed_of_a_rounded_file_agrees(name, tmp_path):
 def test_exact_keeps_the_axes_of_the_file(tmp_path):
     """Two axes of the SO-100 kind: 1.5708 leaves them 3.7e-6 rad from parallel."""
     file = tmp_path / "rounded.urdf"
-    file.write_text(with_rounded_angles(asset("urdf/ur5.urdf").read_text(), 4).replace('rpy="0 0 0"', 'rpy="1e-5 0 0"'))
+    file.write_text(
+        with_rounded_angles(asset("urdf/ur5.urdf").read_text(), 4).replace(
+            'rpy="0 0 0"', 'rpy="1e-5 0 0"'
+        )
+    )
     kept = extract_dh(file, exact=True)
     made = extract_dh(file)
     assert kept.residual.tool < 1e-8
@@ -120,7 +134,9 @@ def test_a_smaller_table_as_designed_is_recommended(tmp_path):
             numbers = extraction.description.numbers
             return np.count_nonzero(np.concatenate([numbers.a, numbers.d]))
 
-        assert any(advice in note for note in written.notes) == (lengths(designed) < lengths(written)), name
+        assert any(advice in note for note in written.notes) == (
+            lengths(designed) < lengths(written)
+        ), name
         assert not any(advice in note for note in designed.notes)
 
 
@@ -144,8 +160,17 @@ def longest_length(path):
     "joints",
     [
         [("0 0 0", "3.1416 0 3.1416"), ("0 0 0", "-3.1416 0 0"), ("0 -0.1 0.3", "0 0 0")],
-        [("0 0 0", "0 0 3.14159"), ("0.1 0.2 0", "-3.14159 0 0"), ("0.3 0 0.1", "0 0 0"), ("0 0.2 0", "0 3.14159 0")],
-        [("0 0 0", "0 0 1.570796"), ("0.4 0 0", "1.570796 1.570796 0"), ("0 -0.4 0", "1.570796 0 0")],
+        [
+            ("0 0 0", "0 0 3.14159"),
+            ("0.1 0.2 0", "-3.14159 0 0"),
+            ("0.3 0 0.1", "0 0 0"),
+            ("0 0.2 0", "0 3.14159 0"),
+        ],
+        [
+            ("0 0 0", "0 0 1.570796"),
+            ("0.4 0 0", "1.570796 1.570796 0"),
+            ("0 -0.4 0", "1.570796 0 0"),
+        ],
     ],
 )
 def test_axes_that_are_parallel_in_the_file_follow_one_that_is_made_parallel(joints, tmp_path):
@@ -157,7 +182,11 @@ def test_axes_that_are_parallel_in_the_file_follow_one_that_is_made_parallel(joi
 def test_a_tilt_that_is_written_stays_though_another_angle_is_rounded(tmp_path):
     file = tmp_path / "arm.urdf"
     for right_angle in ("1.571", "1.5707963", "-1.571"):
-        file.write_text(chain_text([("0 0 0.1", "0 0 0"), ("0.4 0 0", f"0.001 0 {right_angle}"), ("0 0.2 0", "0 0 0")]))
+        file.write_text(
+            chain_text(
+                [("0 0 0.1", "0 0 0"), ("0.4 0 0", f"0.001 0 {right_angle}"), ("0 0.2 0", "0 0 0")]
+            )
+        )
         extraction = extract_dh(file)
         assert extraction.turned == 0
         assert extraction.residual.tool < 1e-9

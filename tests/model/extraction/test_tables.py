@@ -10,7 +10,15 @@ from hypothesis import given, settings, strategies as st
 
 import dhkit
 from acceptance import different_robots_first
-from dhkit.description import Base, Description, Placement, Tool, from_dh, library_robot, world_to_tool
+from dhkit.description import (
+    Base,
+    Description,
+    Placement,
+    Tool,
+    from_dh,
+    library_robot,
+    world_to_tool,
+)
 from dhkit.expressions import exact
 from dhkit.model import extract_dh, urdf_text
 from dhkit.model.urdf import write_urdf
@@ -21,7 +29,9 @@ SEEN = 1e-9
 """m or rad: a smaller entry is rounding."""
 
 length = st.one_of(
-    st.just(0.0), st.sampled_from([0.1, 0.25, -0.3, 0.4]), st.floats(0.05, 0.9).map(lambda x: round(x, 6))
+    st.just(0.0),
+    st.sampled_from([0.1, 0.25, -0.3, 0.4]),
+    st.floats(0.05, 0.9).map(lambda x: round(x, 6)),
 )
 turn = st.one_of(
     st.sampled_from([0.0, 0.0, "pi/2", "-pi/2", "pi", "pi/4"]),
@@ -93,7 +103,10 @@ def test_the_library_comes_back(name, tmp_path):
     q = states(arm, 20)
     assert np.abs(world_to_tool(found, q) - world_to_tool(arm, q)).max() < CLOSE
     assert [joint.name for joint in found.joints] == [joint.name for joint in arm.joints]
-    assert np.allclose(found.numbers.mass, np.nan_to_num(arm.numbers.mass)) or np.isnan(arm.numbers.mass).any()
+    assert (
+        np.allclose(found.numbers.mass, np.nan_to_num(arm.numbers.mass))
+        or np.isnan(arm.numbers.mass).any()
+    )
 
 
 def urdf_of(joints) -> str:
@@ -198,10 +211,34 @@ def test_the_iiwas_table_is_found(tmp_path):
 
 
 AXES = {
-    "parallel": ([("0 0 0", "0 0 0", "0 0 1"), ("0.3 0.4 0.2", "0 0 0", "0 0 1"), ("0.1 0 0.5", "0 0 0", "0 0 1")], 3),
-    "anti-parallel": ([("0 0 0", "0 0 0", "0 0 1"), ("0.3 0 0", "0 0 0", "0 0 -1"), ("0.2 0 0", "0 0 0", "0 0 1")], 4),
-    "coincident": ([("0 0 0.1", "0 0 0", "0 0 1"), ("0 0 0.2", "0 0 0", "0 0 1"), ("0 0 0.3", "0 0 0", "0 0 1")], 1),
-    "intersecting": ([("0 0 0", "0 0 0", "0 0 1"), ("0 0 0", "0 0 0", "1 0 0"), ("0 0 0", "0 0 0", "0 1 0")], 5),
+    "parallel": (
+        [
+            ("0 0 0", "0 0 0", "0 0 1"),
+            ("0.3 0.4 0.2", "0 0 0", "0 0 1"),
+            ("0.1 0 0.5", "0 0 0", "0 0 1"),
+        ],
+        3,
+    ),
+    "anti-parallel": (
+        [
+            ("0 0 0", "0 0 0", "0 0 1"),
+            ("0.3 0 0", "0 0 0", "0 0 -1"),
+            ("0.2 0 0", "0 0 0", "0 0 1"),
+        ],
+        4,
+    ),
+    "coincident": (
+        [
+            ("0 0 0.1", "0 0 0", "0 0 1"),
+            ("0 0 0.2", "0 0 0", "0 0 1"),
+            ("0 0 0.3", "0 0 0", "0 0 1"),
+        ],
+        1,
+    ),
+    "intersecting": (
+        [("0 0 0", "0 0 0", "0 0 1"), ("0 0 0", "0 0 0", "1 0 0"), ("0 0 0", "0 0 0", "0 1 0")],
+        5,
+    ),
 }
 
 
@@ -263,7 +300,9 @@ def test_as_designed_reads_rounded_right_angles(tmp_path):
     (tmp_path / "arm.urdf").write_text(urdf_of(joints))
     written = extract_dh(tmp_path / "arm.urdf", convention="modified")
     assert written.residual.largest < 5e-10
-    assert 1e-7 < np.abs(written.description.numbers.d[1]) < 1e-5  # a micrometre, as the file has it
+    assert (
+        1e-7 < np.abs(written.description.numbers.d[1]) < 1e-5
+    )  # a micrometre, as the file has it
     designed = extract_dh(tmp_path / "arm.urdf", convention="modified", as_designed=True)
     assert designed.description.numbers.d.tolist() == [0.333, 0, 0.316, 0, 0.384, 0, 0]
     assert len(designed.changes) == 6

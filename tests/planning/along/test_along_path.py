@@ -44,7 +44,9 @@ STEP, BY_DIFFERENCES = 1e-4, 1e-4
 SLIDE = 2
 """The cobra's prismatic joint, and where it begins."""
 HOME = np.array([0.2, -0.4, 0.01, 0.0])
-WRIST = np.array([[-0.325, 2.415, 0.449, 1.812, -0.376, -0.035], [-0.149, 1.976, 0.505, 1.583, 0.004, -0.471]])
+WRIST = np.array(
+    [[-0.325, 2.415, 0.449, 1.812, -0.376, -0.035], [-0.149, 1.976, 0.505, 1.583, 0.004, -0.471]]
+)
 """Where a line of the PUMA's tool begins and where it ends, next to a singularity."""
 STRONG = Limits.of(COBRA, velocity=np.inf, torque=2e3)
 
@@ -117,7 +119,9 @@ def test_least_effort_is_a_cubic(duration):
     t = np.linspace(0, duration, 50)
     x = t / duration
     assert motion.duration == pytest.approx(duration, rel=1e-12)
-    np.testing.assert_allclose(motion.q(t)[:, SLIDE], HOME[SLIDE] + 0.1 * x**2 * (3 - 2 * x), atol=0.1 * 1e-3)
+    np.testing.assert_allclose(
+        motion.q(t)[:, SLIDE], HOME[SLIDE] + 0.1 * x**2 * (3 - 2 * x), atol=0.1 * 1e-3
+    )
     least = 12 * mass**2 * 0.1**2 / duration**3 + weight**2 * duration
     assert motion.report.cost == pytest.approx(least, rel=1e-3)
 
@@ -165,7 +169,9 @@ def toppra_duration(toppra, path, limits, points=500):
             return (path.q, path.qs, path.qss)[order](np.minimum(s, 1.0))
 
     scheme = toppra.constraint.DiscretizationType.Interpolation
-    speed = toppra.constraint.JointVelocityConstraint(np.stack([-limits.velocity, limits.velocity], axis=1))
+    speed = toppra.constraint.JointVelocityConstraint(
+        np.stack([-limits.velocity, limits.velocity], axis=1)
+    )
     torque = toppra.constraint.JointTorqueConstraint(
         lambda q, qd, qdd: inverse_dynamics(arm, q, qd, qdd),
         np.stack([-limits.torque, limits.torque], axis=1),
@@ -173,7 +179,9 @@ def toppra_duration(toppra, path, limits, points=500):
         discretization_scheme=scheme,
     )
     s = np.linspace(0, 1, points + 1)
-    _, sd, *_ = toppra.algorithm.TOPPRA([speed, torque], Geometry(), gridpoints=s).compute_parameterization(0, 0)
+    _, sd, *_ = toppra.algorithm.TOPPRA(
+        [speed, torque], Geometry(), gridpoints=s
+    ).compute_parameterization(0, 0)
     return float(np.sum(2 * np.diff(s) / (sd[1:] + sd[:-1])))
 
 
@@ -199,7 +207,9 @@ def test_what_a_coarse_grid_misses_is_made_good(intervals, tool_motion):
     arm, path, fine = tool_motion
     coarse = along_path(arm, path, intervals=intervals)
     assert (coarse.report.slow_down > 1) == (intervals == 12)
-    assert (coarse.report.intervals > intervals) == bool(coarse.report.tightened) == (intervals == 8)
+    assert (
+        (coarse.report.intervals > intervals) == bool(coarse.report.tightened) == (intervals == 8)
+    )
     assert excess(coarse, Limits.of(arm)) < KEPT
     assert fine.duration < coarse.duration < 1.01 * fine.duration
 
@@ -245,7 +255,11 @@ def test_tool_speed_is_kept():
 
 @pytest.mark.parametrize(
     "constraint",
-    [MotorPower(20.0), slow_if(True, TorqueSpeedLine(tuple(Limits.of(PUMA).torque), 3.0)), ToolAcceleration(3.0)],
+    [
+        MotorPower(20.0),
+        slow_if(True, TorqueSpeedLine(tuple(Limits.of(PUMA).torque), 3.0)),
+        ToolAcceleration(3.0),
+    ],
     ids=lambda constraint: constraint.what,
 )
 def test_other_constraints_are_kept_and_used(constraint, tool_motion):
@@ -260,7 +274,9 @@ def test_other_constraints_are_kept_and_used(constraint, tool_motion):
             use = np.abs(tau / np.array(stall) + qd / speed)
         case _:
             x = world_to_tool(arm, motion.q(t[:, None] + [-STEP, 0, STEP]))[..., :3, 3]
-            use = np.linalg.norm(x[:, 0] - 2 * x[:, 1] + x[:, 2], axis=1) / STEP**2 / constraint.limit
+            use = (
+                np.linalg.norm(x[:, 0] - 2 * x[:, 1] + x[:, 2], axis=1) / STEP**2 / constraint.limit
+            )
             use /= 1 + BY_DIFFERENCES
     assert use.max() < 1 + KEPT
     assert motion.duration > 1.01 * free.duration
@@ -324,7 +340,9 @@ def test_too_weak_an_arm_is_named():
     path = JointPath.straight(ARM, [-np.pi / 2, 0.0], [np.pi / 2, 0.0])
     most = np.abs(gravity_torque(ARM, [0.0, 0.0]))
     limits = Limits.of(ARM, torque=most / 2, velocity=np.inf)
-    with pytest.raises(PlanningError, match=rf"at s = 0\.5: joint {ARM.joints[0].name} cannot hold the arm there"):
+    with pytest.raises(
+        PlanningError, match=rf"at s = 0\.5: joint {ARM.joints[0].name} cannot hold the arm there"
+    ):
         along_path(ARM, path, limits=limits)
     with pytest.raises(PlanningError, match=r"the path's end: joint .* cannot hold the arm"):
         along_path(ARM, JointPath.straight(ARM, [-np.pi / 2, 0.0], [0.0, 0.0]), limits=limits)
@@ -354,8 +372,16 @@ LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
         (CORNER, {}, "corner at s = 0.5"),
         (LINGERS, {}, "stands still at s = 0:"),
         (SPIKE, {}, "singular at s = 0.5: joint .* turns ever faster"),
-        (JointPath.straight(ARM, [0, 0], [9, 0]), {}, "the path at s = 1: joint .* above its upper limit"),
-        (BEND, {"limits": Limits.of(ARM, jerk=9.0)}, "curvature jumps at s = 0.5, where joint .* infinite jerk"),
+        (
+            JointPath.straight(ARM, [0, 0], [9, 0]),
+            {},
+            "the path at s = 1: joint .* above its upper limit",
+        ),
+        (
+            BEND,
+            {"limits": Limits.of(ARM, jerk=9.0)},
+            "curvature jumps at s = 0.5, where joint .* infinite jerk",
+        ),
         (SHORT, {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),
         (SHORT, {"objective": "effort", "duration": 1e-2}, "0.01 s are too short: .* in "),
         (SHORT, {"max_iterations": 2}, "within 2 iterations, in 1 start"),
@@ -425,7 +451,10 @@ def test_a_constraint_of_ones_own_holds_in_both_programs(robot, objective):
     arm, *_, path = line_of(robot)
     ends = path.q(0.0), path.q(1.0)
     for free, make in (
-        (along_path(arm, path), lambda **options: along_path(arm, path, objective=objective, **options)),
+        (
+            along_path(arm, path),
+            lambda **options: along_path(arm, path, objective=objective, **options),
+        ),
         (Planner(arm).solve(*ends), lambda **options: planned(arm, objective, ends, **options)),
     ):
         most = np.abs(power(free)).max() / 3
@@ -444,7 +473,9 @@ def planned(arm, objective, ends, constraints, duration):
 def power(motion):
     t = motion.sample_times(1000.0)
     qd = motion.qd(t)
-    return np.sum(reference_torques(motion.description)(motion.q(t), qd, motion.qdd(t)) * qd, axis=1)
+    return np.sum(
+        reference_torques(motion.description)(motion.q(t), qd, motion.qdd(t)) * qd, axis=1
+    )
 
 
 @pytest.mark.slow
@@ -455,7 +486,9 @@ def test_friction_slows_a_motion_down_and_is_in_its_torques(tool_motion):
         motion = along_path(arm, path, objective=wanted, duration=duration, friction=True)
         t = motion.sample_times(1000.0)
         qd = motion.qd(t)
-        tau = reference_torques(arm)(motion.q(t), qd, motion.qdd(t)) + friction_torque(arm, qd, motion.friction)
+        tau = reference_torques(arm)(motion.q(t), qd, motion.qdd(t)) + friction_torque(
+            arm, qd, motion.friction
+        )
         assert (np.abs(tau) / Limits.of(arm).torque).max() < 1 + KEPT
         np.testing.assert_allclose(motion.tau(t), tau, atol=1e-9)
         if wanted == "time":
@@ -478,16 +511,23 @@ def test_a_path_that_comes_too_near_an_obstacle_is_refused(tool_motion):
     arm, path, free = tool_motion
     middle = world_to_tool(arm, path.q(0.5))[:3, 3]
     far = Obstacle.sphere(0.05, middle + np.array([0.0, 0.0, 3.0]), name="far")
-    assert along_path(arm, path, obstacles=[far], clearance=0.02).duration == pytest.approx(free.duration, rel=1e-9)
-    with pytest.raises(PlanningError, match=r"the path at s = .*: .* mm inside ball, 20 mm are asked for"):
-        along_path(arm, path, obstacles=[Obstacle.sphere(0.05, middle, name="ball")], clearance=0.02)
+    assert along_path(arm, path, obstacles=[far], clearance=0.02).duration == pytest.approx(
+        free.duration, rel=1e-9
+    )
+    with pytest.raises(
+        PlanningError, match=r"the path at s = .*: .* mm inside ball, 20 mm are asked for"
+    ):
+        along_path(
+            arm, path, obstacles=[Obstacle.sphere(0.05, middle, name="ball")], clearance=0.02
+        )
 
 
 # Limits of jerk
 
 
 @pytest.mark.parametrize(
-    ("d", "v", "a"), [(0.2, np.inf, np.inf), (0.2, 0.3, np.inf), (0.2, np.inf, 0.5), (0.2, 0.3, 0.5)]
+    ("d", "v", "a"),
+    [(0.2, np.inf, np.inf), (0.2, 0.3, np.inf), (0.2, np.inf, 0.5), (0.2, 0.3, 0.5)],
 )
 def test_under_a_limit_of_jerk_a_slide_is_a_double_s(d, v, a):
     j = 3.0
@@ -497,7 +537,11 @@ def test_under_a_limit_of_jerk_a_slide_is_a_double_s(d, v, a):
     speeding = rise + v / a if v * j >= a**2 else 2 * rise
     best = d / v + speeding
     if d < v * speeding:  # the speed is not reached
-        best = 4 * (d / (2 * j)) ** (1 / 3) if d < 2 * a**3 / j**2 else a / j + np.sqrt((a / j) ** 2 + 4 * d / a)
+        best = (
+            4 * (d / (2 * j)) ** (1 / 3)
+            if d < 2 * a**3 / j**2
+            else a / j + np.sqrt((a / j) ** 2 + 4 * d / a)
+        )
     limits = Limits.of(COBRA, velocity=v, acceleration=a, torque=np.inf, jerk=j)
     motion = along_path(COBRA, slide(d), limits=limits)
     assert motion.duration == pytest.approx(best, rel=1e-3)
@@ -514,7 +558,9 @@ def test_jerk_is_limited_along_a_line(name, objective):
     motion = along_path(arm, path, limits=limits)
     assert motion.duration > free.duration
     if objective == "effort":
-        slow = along_path(arm, path, objective="effort", duration=1.5 * motion.duration, limits=limits)
+        slow = along_path(
+            arm, path, objective="effort", duration=1.5 * motion.duration, limits=limits
+        )
         assert slow.report.cost < motion_cost(motion.slowed(1.5))
         motion = slow
     t = motion.sample_times(5000.0)

@@ -42,7 +42,10 @@ effort = 100
 body = { mass = 1, com = [0, 0, 0], inertia = { xx = 0.01, yy = 0.01, zz = 0.01 } }
 shape = { sphere = { radius = 0.25 } }
 """
-ONE, TWO = from_toml(ROD + JOINT.format(alpha=0)), from_toml(ROD + JOINT.format(alpha='"pi/2"') + JOINT.format(alpha=0))
+ONE, TWO = (
+    from_toml(ROD + JOINT.format(alpha=0)),
+    from_toml(ROD + JOINT.format(alpha='"pi/2"') + JOINT.format(alpha=0)),
+)
 BALL = from_toml(ROD + SLIDE)
 
 
@@ -56,7 +59,11 @@ def test_a_contact_of_any_depth_is_found_from_few_states(arm, law):
         motion = Trajectory.from_samples(arm, [0, 0.7], ends, rates)
         size, share = 10 ** rng.uniform(-4, -1.5), rng.uniform(0.3, 0.95)
         point = Arm(arm).frames(motion.q(rng.uniform(0.1, 0.6)))[-1]
-        near = point[:3, 3] - (1 - share) * point[:3, 0] + rng.normal(size=3) * (0.002 + size) * rng.choice([0.3, 1.5])
+        near = (
+            point[:3, 3]
+            - (1 - share) * point[:3, 0]
+            + rng.normal(size=3) * (0.002 + size) * rng.choice([0.3, 1.5])
+        )
         scene = [Obstacle.sphere(size, near)]
         least = np.full((8, 1), rng.choice([0.0, 0.003]))
 
@@ -64,7 +71,9 @@ def test_a_contact_of_any_depth_is_found_from_few_states(arm, law):
             return np.asarray(distance(arm, q, scene).distance)[:, None]
 
         states = Checker(loaded(arm), Limits.of(arm), points=8).states(motion)
-        found = min(gaps(states.q).min(), smallest_between(states, gaps(states.q), gaps, least).min())
+        found = min(
+            gaps(states.q).min(), smallest_between(states, gaps(states.q), gaps, least).min()
+        )
         truth = gaps(motion.q(np.linspace(0, 0.7, 20_001))).min()
         seen += truth < least[0, 0] - SMALLEST_TRAVEL
         missed += truth < least[0, 0] - SMALLEST_TRAVEL and found >= least[0, 0]
@@ -92,7 +101,9 @@ def test_a_needle_in_the_way_of_a_rod_is_not_passed(intervals, angle):
     needle = [Obstacle.sphere(0.0005, (0.85 * np.cos(angle), 0.85 * np.sin(angle), 0))]
     options = {"obstacles": needle, "clearance": 0.0005}
     with pytest.raises(PlanningError, match="sphere"):
-        Arm(ONE).plan([0.0], [3.0], intervals=intervals, max_iterations=50, compare=False, **options)
+        Arm(ONE).plan(
+            [0.0], [3.0], intervals=intervals, max_iterations=50, compare=False, **options
+        )
     with pytest.raises(PlanningError, match=r"path at s = .* sphere"):
         Arm(ONE).plan_path(JointPath.straight(ONE, [0.0], [3.0]), intervals=intervals, **options)
 

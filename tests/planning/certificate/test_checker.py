@@ -21,7 +21,8 @@ def test_a_motion_is_certified_against_the_arms_limits_or_others():
     motion = arm.quintic([0, 0], [1.0, 0.5])
     assert arm.certify(motion).ok
     slow = Limits.of(
-        arm.description, velocity=0.5 * np.abs(motion.qd(np.linspace(0, motion.duration, 500))).max(axis=0)
+        arm.description,
+        velocity=0.5 * np.abs(motion.qd(np.linspace(0, motion.duration, 500))).max(axis=0),
     )
     certificate = arm.certify(motion, slow)
     assert not certificate.ok
@@ -44,7 +45,9 @@ def test_what_is_not_checked_is_said():
     rows = [(0, 0.3, 0, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)]
     bare = dhkit.Arm.from_dh(rows).with_limits(velocity=[2.0] * 3, torque=[50.0] * 3)
     certificate = bare.certify(bare.quintic([0, 0, 0], [1, 0.5, 0.4]))
-    assert certificate.not_checked == ("torques, as the links of joint1, joint2, joint3 have no body",)
+    assert certificate.not_checked == (
+        "torques, as the links of joint1, joint2, joint3 have no body",
+    )
     assert "; not checked: torques" in certificate._repr_html_()
     arm = dhkit.Arm.load("panda")
     swing = arm.quintic("ready", np.array([0.2, -0.4, 0.1, -2.0, 0.1, 1.7, 0.9]))
@@ -173,7 +176,12 @@ def test_arguments_are_checked():
 def test_a_table_read_as_samples_keeps_its_payload(tmp_path):
     motion = ARM.quintic("zero", "ready", duration=0.35).carrying(dhkit.Payload(6.0))
     text = motion.save(tmp_path / "loaded.csv").read_text()
-    for changed in (text, f"\n{text}", text.replace("# dhkit", "#  DHkit"), text.replace("# payload:", "#payload :")):
+    for changed in (
+        text,
+        f"\n{text}",
+        text.replace("# dhkit", "#  DHkit"),
+        text.replace("# payload:", "#payload :"),
+    ):
         (tmp_path / "changed.csv").write_text(changed)
         again = Trajectory.read(tmp_path / "changed.csv", ARM)
         assert again.payload == motion.payload
@@ -183,10 +191,14 @@ def test_a_table_read_as_samples_keeps_its_payload(tmp_path):
 @pytest.mark.parametrize("turns", [11.5, 23, 46])
 def test_whole_turns_between_the_points_of_a_piece_are_seen(turns):
     """23 turns in 23 steps put all states of a piece at one phase of gravity."""
-    arm = from_dh([(0, 0, 1.0, 0)], bodies=[{"mass": 1, "com": [-0.5, 0, 0], "inertia": np.eye(3) * 0.01}])
+    arm = from_dh(
+        [(0, 0, 1.0, 0)], bodies=[{"mass": 1, "com": [-0.5, 0, 0], "inertia": np.eye(3) * 0.01}]
+    )
     arm = replace(arm, gravity=(exact(0), exact(-9.81), exact(0)))
     rate = 2 * np.pi * turns / 2.0
-    motion = Trajectory.from_samples(arm, [0, 2.0], [[-np.pi / 2], [-np.pi / 2 + 2 * rate]], [[rate], [rate]])
+    motion = Trajectory.from_samples(
+        arm, [0, 2.0], [[-np.pi / 2], [-np.pi / 2 + 2 * rate]], [[rate], [rate]]
+    )
     limits = Limits.of(arm, velocity=400.0, torque=3.0)
     certificate = certify(arm, motion, limits)
     assert not certificate.ok

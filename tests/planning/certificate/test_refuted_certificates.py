@@ -68,10 +68,14 @@ def chebyshev(degree):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
-@pytest.mark.parametrize(("convention", "place"), [("standard", (0.5, 0.4, -0.25)), ("modified", (0, 0.5, 0.25))])
+@pytest.mark.parametrize(
+    ("convention", "place"), [("standard", (0.5, 0.4, -0.25)), ("modified", (0, 0.5, 0.25))]
+)
 def test_links_locked_to_a_base_without_shapes_are_checked(kind, convention, place, tmp_path):
     before, after, middle = place
-    text = WITHOUT_A_BASE.format(convention=convention, kind=kind, before=before, after=after, middle=middle)
+    text = WITHOUT_A_BASE.format(
+        convention=convention, kind=kind, before=before, after=after, middle=middle
+    )
     whole = dhkit.Arm(from_toml(text.replace("bare base", "bare_base")))
     ball = Obstacle.sphere(0.05, (0.25, 0, 0.1))
     locked = whole.lock({0: 0.0})
@@ -86,7 +90,10 @@ def test_an_arm_below_a_floor_is_named():
     arm = dhkit.Arm.from_dh([(0, 0.4, 0.3, 0), (0, 0, 0.25, 0)])
     motion = arm.cubic([0.1, 0.2], [0.6, 0.7], duration=1)
     found = arm.certify(motion, obstacles=[Floor(0.9)]).not_checked
-    assert [words.split(",")[0] for words in found] == ["part of link 1 and floor", "part of link 2 and floor"]
+    assert [words.split(",")[0] for words in found] == [
+        "part of link 1 and floor",
+        "part of link 2 and floor",
+    ]
 
 
 def test_a_clearance_that_is_reduced_at_an_end_holds_between_states():
@@ -113,7 +120,9 @@ def test_jumps_count_beside_what_the_motion_does(wide):
 def test_a_range_that_is_a_point_does_not_make_a_link_stand(limits):
     arm = rod(limits=limits)
     ball = Obstacle.sphere(0.1, (0, 0.8, 0))
-    assert not arm.certify(turn(arm, 0.0, 3.0), Limits.of(arm, lower=-4, upper=4), obstacles=[ball]).ok
+    assert not arm.certify(
+        turn(arm, 0.0, 3.0), Limits.of(arm, lower=-4, upper=4), obstacles=[ball]
+    ).ok
     assert arm.distance([np.pi / 2], [ball]).distance == pytest.approx(-0.11)
 
 
@@ -148,7 +157,9 @@ def test_bounds_of_positions_contain_the_rounding_of_their_polynomials(degree):
 
 def test_a_torque_that_is_proved_is_not_refused_for_its_cubics():
     arm = dhkit.Arm.load("ur5")
-    motion = Trajectory(arm.description, [0, 1], [[[0] * 6, [-5, 6, 6, 4, 6, -3], [-7, 7, 1, -7, 4, -3]]])
+    motion = Trajectory(
+        arm.description, [0, 1], [[[0] * 6, [-5, 6, 6, 4, 6, -3], [-7, 7, 1, -7, 4, -3]]]
+    )
     most = np.abs(motion.tau(np.linspace(0, 1, 20_001))).max(axis=0)
     free = {"lower": -np.inf, "upper": np.inf, "velocity": np.inf}
     assert arm.certify(motion, Limits.of(arm, torque=most * (1 + 1e-5), **free)).ok

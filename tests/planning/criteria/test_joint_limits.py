@@ -18,7 +18,9 @@ def states(q, qd=(0, 0), qdd=(0, 0), jerk=(0, 0)):
 
 def test_they_stand_in_the_order_of_their_names():
     found = joint_limits(LIMITS)
-    assert [constraint.what for constraint in found] == [limit.what for limit in list(Limit)[: len(found)]]
+    assert [constraint.what for constraint in found] == [
+        limit.what for limit in list(Limit)[: len(found)]
+    ]
     assert [constraint.is_limiting for constraint in found] == [True, True, False, True, True]
     assert all(constraint.of_joints for constraint in found)
 

@@ -36,7 +36,9 @@ def surface(part):
         case Box(size):
             local = np.sign(u) * [float(edge) / 2 for edge in size]
         case _:
-            local = trimesh.load_mesh(part.file).vertices * [float(factor) for factor in part.geometry.scale]
+            local = trimesh.load_mesh(part.file).vertices * [
+                float(factor) for factor in part.geometry.scale
+            ]
     return local @ part.T_link_part[:3, :3].T + part.T_link_part[:3, 3]
 
 
@@ -55,7 +57,9 @@ def test_every_part_lies_in_its_links_capsules(name):
     for part in link_parts(arm):
         points = surface(part)
         # Convex parts are in one capsule if their surface is.
-        best = max(depth(capsule, points).min() for capsule in capsules if capsule.link == part.link)
+        best = max(
+            depth(capsule, points).min() for capsule in capsules if capsule.link == part.link
+        )
         assert best > -OUTSIDE
 
 
@@ -73,7 +77,10 @@ def test_a_capsules_own_capsule_is_itself():
     bar = Balls(np.array([(0.1, 0.2, 0.3), (0.5, -0.1, 0.9)]), np.array([0.05, 0.05]))
     found = refine(bar)
     assert abs(found.radius - 0.05) < OUTSIDE
-    assert abs(np.linalg.norm(found.end - found.start) - np.linalg.norm(np.diff(bar.centres, axis=0))) < OUTSIDE
+    assert (
+        abs(np.linalg.norm(found.end - found.start) - np.linalg.norm(np.diff(bar.centres, axis=0)))
+        < OUTSIDE
+    )
 
 
 def test_capsules_are_not_much_larger_than_what_they_enclose():
@@ -122,11 +129,15 @@ def test_every_two_links_that_no_joint_connects_are_checked_or_named(name):
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_pairs_do_not_depend_on_the_size_of_an_arm(size):
-    arm = from_dh([(0, 0.1 * size, 0.4 * size, "pi/2"), (0, 0, 0.4 * size, 0), (0, 0, 0.3 * size, 0)])
+    arm = from_dh(
+        [(0, 0.1 * size, 0.4 * size, "pi/2"), (0, 0, 0.4 * size, 0), (0, 0, 0.3 * size, 0)]
+    )
     same = link_pairs(from_dh([(0, 0.1, 0.4, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)]))
     pairs = link_pairs(arm)
     assert replace(pairs, steady=()) == replace(same, steady=()) and same.capsules
-    assert [pair.distance / size for pair in pairs.steady] == pytest.approx([pair.distance for pair in same.steady])
+    assert [pair.distance / size for pair in pairs.steady] == pytest.approx(
+        [pair.distance for pair in same.steady]
+    )
 
 
 def test_a_planar_arm_does_not_care_for_the_floor():

@@ -20,7 +20,12 @@ from dhkit.planning.obstacles import (
     world_axes,
 )
 from dhkit.planning.obstacles.scene import Solids
-from dhkit.planning.obstacles.solids import axis_bounds, capsule_distances, obstacle_distances, segment_distances
+from dhkit.planning.obstacles.solids import (
+    axis_bounds,
+    capsule_distances,
+    obstacle_distances,
+    segment_distances,
+)
 
 COAL = 1e-7
 """m: coal's iterations stop at 1e-9 of a bound, not of the distance."""
@@ -59,7 +64,9 @@ def test_segments_against_sampling():
     rng = np.random.default_rng(0)
     pairs = rng.uniform(-1, 1, (60, 2, 2, 3))
     pairs[:10, 1, 1] = pairs[:10, 1, 0]  # points
-    pairs[10:20, 1, 1] = pairs[10:20, 1, 0] + 0.7 * (pairs[10:20, 0, 1] - pairs[10:20, 0, 0])  # parallel
+    pairs[10:20, 1, 1] = pairs[10:20, 1, 0] + 0.7 * (
+        pairs[10:20, 0, 1] - pairs[10:20, 0, 0]
+    )  # parallel
     pairs[20:25, 1] = pairs[20:25, 0]  # one and the same
     for first, second in pairs:
         sampled, step = by_sampling(first, second)
@@ -72,7 +79,10 @@ def test_coal_agrees_with_the_closed_form_of_capsules():
     rng = np.random.default_rng(1)
     axes = rng.uniform(-0.5, 0.5, (200, 2, 3))
     axes[:, 1] = (
-        axes[:, 0] + 0.4 * (axes[:, 1] - axes[:, 0]) / np.linalg.norm(np.diff(axes, axis=1)[:, 0], axis=1)[:, None]
+        axes[:, 0]
+        + 0.4
+        * (axes[:, 1] - axes[:, 0])
+        / np.linalg.norm(np.diff(axes, axis=1)[:, 0], axis=1)[:, None]
     )
     for obstacle in (SCENE[1], SCENE[3]):
         closed = segment_distances(axes, obstacle.axis) - obstacle.radius - 0.07
@@ -107,7 +117,10 @@ def test_bounds_bound():
     rng = np.random.default_rng(3)
     axes = rng.uniform(-1, 1, (300, 2, 3))
     axes[:, 1] = (
-        axes[:, 0] + 0.5 * (axes[:, 1] - axes[:, 0]) / np.linalg.norm(np.diff(axes, axis=1)[:, 0], axis=1)[:, None]
+        axes[:, 0]
+        + 0.5
+        * (axes[:, 1] - axes[:, 0])
+        / np.linalg.norm(np.diff(axes, axis=1)[:, 0], axis=1)[:, None]
     )
     for obstacle in (SCENE[0], SCENE[1], SCENE[3]):
         low, high = axis_bounds(Solids.of([obstacle] * len(axes)), axes)
@@ -147,7 +160,12 @@ def test_the_floor_is_coals_half_space():
         place = coal.Transform3s(np.eye(3), ends[k, i, end])
         result = coal.DistanceResult()
         gap = coal.distance(
-            coal.Sphere(capsules[i].radius), place, ground, coal.Transform3s(), coal.DistanceRequest(), result
+            coal.Sphere(capsules[i].radius),
+            place,
+            ground,
+            coal.Transform3s(),
+            coal.DistanceRequest(),
+            result,
         )
         expected[k] = min(expected[k], gap)
     assert np.abs(found - expected).max() < COAL
@@ -158,7 +176,9 @@ def test_the_worst_pair_has_names():
     found = distance(arm, states(arm), SCENE, self_collision=True)
     link, other = found.pair
     assert link.startswith("link ") and other in {"crate", "ball", "post", "floor"}
-    assert distance(arm, np.zeros(6), [Obstacle.sphere(0.1, (9, 9, 9), name="far")]).pair[1] == "far"
+    assert (
+        distance(arm, np.zeros(6), [Obstacle.sphere(0.1, (9, 9, 9), name="far")]).pair[1] == "far"
+    )
 
 
 def test_nan_stays_in_its_row():

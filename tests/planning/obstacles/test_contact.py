@@ -38,7 +38,9 @@ def test_it_is_the_smallest_distance_of_all_checked_pairs(name, law):
     numbers = description.numbers
     bound = np.where(numbers.prismatic, 1.0, np.pi)
     lower, upper = np.maximum(numbers.lower, -bound), np.minimum(numbers.upper, bound)
-    states = np.random.default_rng(0).uniform(lower, upper, (law.samples(1000, quick=6), description.n))
+    states = np.random.default_rng(0).uniform(
+        lower, upper, (law.samples(1000, quick=6), description.n)
+    )
     for q in states:
         found = nearest_links(description, q)
         if not bodies:
@@ -66,7 +68,9 @@ def test_an_arm_without_pairs_has_no_nearest_links():
     assert all(nearest_links(description, q) is None for q in product((-1.0, 1.0), repeat=2))
 
 
-@pytest.mark.parametrize("name", different_robots_first(["puma560", "panda", "stanford", "cobra600"]))
+@pytest.mark.parametrize(
+    "name", different_robots_first(["puma560", "panda", "stanford", "cobra600"])
+)
 def test_the_points_of_a_link_and_an_obstacle_are_on_both_and_no_nearer_than_capsules(name, law):
     description = library_robot(name)
     reach = description.reach
@@ -115,7 +119,9 @@ def test_a_floor_is_as_near_as_the_lowest_point():
 def test_the_nearest_of_several_obstacles_is_that_of_each_alone():
     description = library_robot("puma560")
     rng = np.random.default_rng(5)
-    scene = [Obstacle.sphere(0.05, rng.uniform(-1, 1, 3), name=f"ball {k}") for k in range(6)] + [Floor(-0.7)]
+    scene = [Obstacle.sphere(0.05, rng.uniform(-1, 1, 3), name=f"ball {k}") for k in range(6)] + [
+        Floor(-0.7)
+    ]
     for q in rng.uniform(-2, 2, (5, 6)):
         alone = [nearest_obstacle(description, q, [obstacle]) for obstacle in scene]
         least = min(alone, key=lambda found: found.distance)

@@ -21,7 +21,9 @@ def test_a_box_stands_where_its_pose_says():
     assert np.array_equal(Obstacle.box((1, 1, 1), at=(1, 2, 3)).T_world_obstacle, pose((1, 2, 3)))
 
 
-@pytest.mark.parametrize("end", [(0.3, 0.1, 0.9), (0.3, 0.1, -0.9), (1.0, 0.1, 0.2), (-2.0, 5.0, 0.7)])
+@pytest.mark.parametrize(
+    "end", [(0.3, 0.1, 0.9), (0.3, 0.1, -0.9), (1.0, 0.1, 0.2), (-2.0, 5.0, 0.7)]
+)
 def test_a_capsule_goes_from_start_to_end(end):
     bar = Obstacle.capsule(0.05, (0.3, 0.1, 0.2), end)
     assert isinstance(bar.geometry, Capsule)
@@ -47,15 +49,24 @@ def test_obstacles_are_values():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Obstacle.box((1, 2), (0, 0, 0)), r"box: size is \(1.0, 2.0\); expected three positive numbers, m"),
+        (
+            lambda: Obstacle.box((1, 2), (0, 0, 0)),
+            r"box: size is \(1.0, 2.0\); expected three positive numbers, m",
+        ),
         (lambda: Obstacle.box((1, -2, 1), (0, 0, 0)), "expected three positive numbers"),
         (lambda: Obstacle.box((1, 2, np.inf), (0, 0, 0)), "expected three positive numbers"),
         (lambda: Obstacle.box((1, 1, 1), (0, 0)), r"box: at is of shape \(2,\); expected a pose"),
         (lambda: Obstacle.box((1, 1, 1), 2 * np.eye(4)), "box: at is not a pose"),
         (lambda: Obstacle.box((1, 1, 1), np.full((4, 4), np.nan)), "expected a pose"),
-        (lambda: Obstacle.sphere(0, (0, 0, 0)), "sphere: radius is 0.0; expected a positive number, m"),
+        (
+            lambda: Obstacle.sphere(0, (0, 0, 0)),
+            "sphere: radius is 0.0; expected a positive number, m",
+        ),
         (lambda: Obstacle.sphere((1, 2), (0, 0, 0)), "expected a positive number"),
-        (lambda: Obstacle.sphere(1, (0, 0, np.nan)), "sphere: centre is .*; expected a finite position"),
+        (
+            lambda: Obstacle.sphere(1, (0, 0, np.nan)),
+            "sphere: centre is .*; expected a finite position",
+        ),
         (lambda: Obstacle.capsule(1, (0, 0, 0), (0, 0, 0)), "expected two points"),
         (lambda: Obstacle.sphere(1, (0, 0, 0), name=""), "name is empty"),
         (lambda: Floor(np.nan), "floor: height is nan; expected a finite number, m"),

@@ -42,7 +42,9 @@ def states(arm, count=300, seed=0):
 
 def or_of_shapes(arm, q, least):
     """Return the smaller of given distances and those of the links that are measured by their shapes, (N,), m."""
-    return np.min([least, *(shape_distances(arm, q, links) for links in link_pairs(arm).shapes)], axis=0)
+    return np.min(
+        [least, *(shape_distances(arm, q, links) for links in link_pairs(arm).shapes)], axis=0
+    )
 
 
 def test_gaps_are_coals_distances(law, ur5):
@@ -78,13 +80,19 @@ def test_planes_have_the_obstacle_on_one_side_and_the_link_on_the_other(ur5):
         clear = gaps.gap[:, p] > 1e-6
         n, level = gaps.normal[clear, p], gaps.level[clear, p]
         np.testing.assert_allclose(np.linalg.norm(n, axis=1), 1.0, atol=1e-12)
-        if pair.obstacle is None:  # the plane touches the first link, in its frame, and the other is beyond
+        if (
+            pair.obstacle is None
+        ):  # the plane touches the first link, in its frame, and the other is beyond
             frame = world_to_frames(ur5, q[clear])[:, capsules[pair.capsule].link]
             first, second = (
-                np.einsum("kei,kij,kj->ke", axes[clear, i] - frame[:, None, :3, 3], frame[:, :3, :3], n)
+                np.einsum(
+                    "kei,kij,kj->ke", axes[clear, i] - frame[:, None, :3, 3], frame[:, :3, :3], n
+                )
                 for i in (pair.capsule, pair.other)
             )
-            np.testing.assert_allclose(first.max(axis=1) + capsules[pair.capsule].radius, level, atol=1e-9)
+            np.testing.assert_allclose(
+                first.max(axis=1) + capsules[pair.capsule].radius, level, atol=1e-9
+            )
             beyond = second.min(axis=1) - capsules[pair.other].radius - level
             np.testing.assert_allclose(beyond, gaps.gap[clear, p], atol=1e-9)
             continue
@@ -108,7 +116,11 @@ def test_rows_hold_at_a_clear_state_by_their_gaps(ur5):
         rows = separation.rows(gaps, gaps.gap < 0.3, np.full(gaps.gap.shape, 0.03))
         frames = world_to_frames(ur5, state)
         for row in rows:
-            T = frames[row.link] if row.frame is None else np.linalg.solve(frames[row.frame], frames[row.link])
+            T = (
+                frames[row.link]
+                if row.frame is None
+                else np.linalg.solve(frames[row.frame], frames[row.link])
+            )
             assert row.normal @ (T[:3, :3] @ row.point + T[:3, 3]) >= row.level - 1e-12
         assert {row.knot for row in rows} == {0, 1, 2}
 
@@ -141,7 +153,9 @@ def test_distances_of_single_pairs_are_those_of_all(ur5):
     separation = Separation(ur5, SCENE, self_collision=True)
     each = np.stack([pair_distances(ur5, q, SCENE, pair) for pair in separation.pairs], axis=1)
     np.testing.assert_allclose(
-        or_of_shapes(ur5, q, each.min(axis=1)), distance(ur5, q, SCENE, self_collision=True).distance, atol=1e-8
+        or_of_shapes(ur5, q, each.min(axis=1)),
+        distance(ur5, q, SCENE, self_collision=True).distance,
+        atol=1e-8,
     )
     left_out = separation.pairs[::2]
     rest = smallest_distances(ur5, q, SCENE, True, left_out)
@@ -171,7 +185,9 @@ def test_the_smallest_distance_is_that_of_all_pairs(law, ur5, itself):
     if itself:
         ours = or_of_shapes(ur5, q, ours)
     assert (theirs > 0.01).any() and (theirs < -0.01).any()
-    law.holds("m between the smallest and the smallest of all", np.abs(ours - theirs).max(), 1e-8, 0)
+    law.holds(
+        "m between the smallest and the smallest of all", np.abs(ours - theirs).max(), 1e-8, 0
+    )
 
 
 @pytest.mark.slow

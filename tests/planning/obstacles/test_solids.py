@@ -41,7 +41,9 @@ def solid(part):
     return coal.ConvexBase.convexHull(points, False, "")
 
 
-@pytest.mark.parametrize(("name", "links"), [("al5d", (0, 2)), ("stanford", (1, 3)), ("puma560", (0, 4))])
+@pytest.mark.parametrize(
+    ("name", "links"), [("al5d", (0, 2)), ("stanford", (1, 3)), ("puma560", (0, 4))]
+)
 def test_shapes_are_as_far_apart_as_coal_says_at_pinocchios_poses(name, links):
     arm = dhkit.Arm.load(name)
     rng = np.random.default_rng(0)
@@ -57,7 +59,12 @@ def test_shapes_are_as_far_apart_as_coal_says_at_pinocchios_poses(name, links):
                 T1, T2 = (frames[part.link] @ part.T_link_part for part in (first, second))
                 places = [coal.Transform3s(T[:3, :3].copy(), T[:3, 3].copy()) for T in (T1, T2)]
                 request, result = coal.DistanceRequest(), coal.DistanceResult()
-                least = min(least, coal.distance(solid(first), places[0], solid(second), places[1], request, result))
+                least = min(
+                    least,
+                    coal.distance(
+                        solid(first), places[0], solid(second), places[1], request, result
+                    ),
+                )
         if least > -1e-3:  # depths are measured less exactly
             assert found[k] == pytest.approx(least, abs=COAL)
         else:
@@ -72,13 +79,17 @@ def test_a_depth_that_coal_does_not_find_is_a_penetration():
     assert np.isfinite(found).all() and found.min() > -1.0
     one = coal.Cylinder(0.1, 0.2)
     place = coal.Transform3s()
-    same = signed_distance(coal, one, place, coal.Cylinder(0.1, 0.2), place, distance_request(), coal.DistanceResult())
+    same = signed_distance(
+        coal, one, place, coal.Cylinder(0.1, 0.2), place, distance_request(), coal.DistanceResult()
+    )
     assert -0.3 < same < 0
 
 
 def test_what_is_not_checked_is_said():
     found = distance(library_robot("panda"), np.zeros(7), self_collision=True)
-    assert found.not_checked == ("link 1 and link 3, link 3 and link 5, which overlap in all sampled configurations",)
+    assert found.not_checked == (
+        "link 1 and link 3, link 3 and link 5, which overlap in all sampled configurations",
+    )
     assert "not checked: link 1 and link 3" in repr(found)
     near = "parts of the base and link 2, 8.57 mm apart in all configurations"
     assert distance(library_robot("al5d"), np.zeros(4), self_collision=True).not_checked == (near,)

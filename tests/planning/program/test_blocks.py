@@ -11,7 +11,10 @@ from dhkit.planning.program import Block, BlockProgram, LocalFunction, Scaling
 def functions():
     """Two local functions with shared variables, and the same as Python functions of CasADi's symbols."""
     z, p = casadi.SX.sym("z", 3), casadi.SX.sym("p", 2)
-    both = casadi.vertcat(z[0] * casadi.sin(z[1]) + p[0], z[2] ** 2 * z[0]), p[1] * casadi.exp(z[0] - z[2])
+    both = (
+        casadi.vertcat(z[0] * casadi.sin(z[1]) + p[0], z[2] ** 2 * z[0]),
+        p[1] * casadi.exp(z[0] - z[2]),
+    )
     y = casadi.SX.sym("y", 1)
     return LocalFunction(z, p, *both), LocalFunction(y, casadi.SX(0, 1), y**3), (z, p, both)
 
@@ -22,7 +25,10 @@ def chain(functions, points=5):
     k = np.arange(points)
     variables = np.stack([2 * k, 2 * k + 1, 2 * k + 2])
     parameters = np.stack([k, np.full(points, points)])
-    blocks = Block(first, variables, parameters), Block(second, 2 * k[None], np.zeros((0, points), dtype=int))
+    blocks = (
+        Block(first, variables, parameters),
+        Block(second, 2 * k[None], np.zeros((0, points), dtype=int)),
+    )
     return BlockProgram(2 * points + 1, points + 1, blocks)
 
 
@@ -30,7 +36,9 @@ def written_out(functions, points=5):
     _, _, (z, p, (rows, cost)) = functions
     function = casadi.Function("both", [z, p], [rows, cost])
     x, q = casadi.SX.sym("x", 2 * points + 1), casadi.SX.sym("q", points + 1)
-    values = [function(x[2 * k : 2 * k + 3], casadi.vertcat(q[k], q[points])) for k in range(points)]
+    values = [
+        function(x[2 * k : 2 * k + 3], casadi.vertcat(q[k], q[points])) for k in range(points)
+    ]
     g = casadi.vertcat(*(value[0] for value in values), *(x[2 * k] ** 3 for k in range(points)))
     return x, q, sum(value[1] for value in values), g
 
@@ -40,10 +48,14 @@ def test_values_and_derivatives_are_those_of_the_program_written_out(functions):
     weights, weight = casadi.SX.sym("lam", g.numel()), casadi.SX.sym("weight")
     hessian = casadi.triu(casadi.hessian(weight * f + casadi.dot(weights, g), x)[0])
     truth = casadi.Function(
-        "truth", [x, q, weight, weights], [f, g, casadi.gradient(f, x), casadi.jacobian(g, x), hessian]
+        "truth",
+        [x, q, weight, weights],
+        [f, g, casadi.gradient(f, x), casadi.jacobian(g, x), hessian],
     )
     rng = np.random.default_rng(5)
-    at = [rng.normal(size=size) for size in (program.variables, program.parameters, 1, program.rows)]
+    at = [
+        rng.normal(size=size) for size in (program.variables, program.parameters, 1, program.rows)
+    ]
     function, derivatives = program.functions
     for units in (program.unscaled, scaling(program, rng)):
         u, r = units.unit, units.row_unit
@@ -55,7 +67,13 @@ def test_values_and_derivatives_are_those_of_the_program_written_out(functions):
             derivatives["hess_lag"](*arguments),
         ]
         f, g, gradient, jacobian, hessian = (np.array(value) for value in truth(*at))
-        expected = f, g / r[:, None], gradient * u[:, None], jacobian * u / r[:, None], hessian * u * u[:, None]
+        expected = (
+            f,
+            g / r[:, None],
+            gradient * u[:, None],
+            jacobian * u / r[:, None],
+            hessian * u * u[:, None],
+        )
         for ours, theirs in zip(found, expected, strict=True):
             np.testing.assert_allclose(np.array(ours), theirs, rtol=1e-12, atol=1e-12)
 

@@ -9,8 +9,30 @@ from dhkit import Arm, Limits, Obstacle, pose
 from dhkit.planning.obstacles import Floor
 from random_arms import random_body, random_drive
 
-LIBRARY = ("puma560", "ur5", "stanford", "al5d", "panda", "cobra600", "planar3r", "irb140", "jaco", "manutec_r3")
-KINDS = ("library", "table", "locked", "small", "large", "tilted", "nearly parallel", "urdf", "wide", "narrow")
+LIBRARY = (
+    "puma560",
+    "ur5",
+    "stanford",
+    "al5d",
+    "panda",
+    "cobra600",
+    "planar3r",
+    "irb140",
+    "jaco",
+    "manutec_r3",
+)
+KINDS = (
+    "library",
+    "table",
+    "locked",
+    "small",
+    "large",
+    "tilted",
+    "nearly parallel",
+    "urdf",
+    "wide",
+    "narrow",
+)
 FREE = np.pi
 """rad: range of joints without limits."""
 
@@ -30,8 +52,14 @@ class Case:
 
     def certify(self, **options):
         """Return the certificate; ``options`` replace what the case has."""
-        own = {"obstacles": self.scene, "clearance": self.clearance, "self_collision": self.self_collision}
-        return self.arm.certify(self.motion, self.limits, self.friction, self.payload, **(own | options))
+        own = {
+            "obstacles": self.scene,
+            "clearance": self.clearance,
+            "self_collision": self.self_collision,
+        }
+        return self.arm.certify(
+            self.motion, self.limits, self.friction, self.payload, **(own | options)
+        )
 
 
 def random_case(rng, kind, folder):
@@ -56,7 +84,9 @@ def random_case(rng, kind, folder):
     limits = verge_of(arm, motion, payload, friction)
     q = motion.q(np.linspace(0, motion.duration, 400))
     found = arm.distance(q, scene, self_collision=True)
-    scene = tuple(item for item, gaps in zip(scene, found.per_obstacle.T, strict=True) if gaps.min() > 0)
+    scene = tuple(
+        item for item, gaps in zip(scene, found.per_obstacle.T, strict=True) if gaps.min() > 0
+    )
     self_collision = bool(found.itself.min() > 0)
     gap = float(arm.distance(q, scene, self_collision).distance.min())
     clearance = gap * rng.choice([0.5, 0.9, 0.999]) if np.isfinite(gap) else 0.0
@@ -83,14 +113,22 @@ def random_arm(rng, kind, folder):
     for _ in range(n):
         twist = float(rng.choice([0, np.pi / 2, -np.pi / 2, rng.uniform(-np.pi, np.pi)]))
         if kind == "nearly parallel":
-            twist = float(rng.choice([0, np.pi / 2])) + 10 ** rng.uniform(-8, -3) * rng.choice([-1, 1])
-        d, a = (float(x) for x in size * rng.choice([0.0, 1.0], 2, p=[0.3, 0.7]) * rng.uniform(0.1, 0.5, 2))
+            twist = float(rng.choice([0, np.pi / 2])) + 10 ** rng.uniform(-8, -3) * rng.choice(
+                [-1, 1]
+            )
+        d, a = (
+            float(x)
+            for x in size * rng.choice([0.0, 1.0], 2, p=[0.3, 0.7]) * rng.uniform(0.1, 0.5, 2)
+        )
         rows.append((float(rng.uniform(-np.pi, np.pi)), d, a, twist))
     kinds = "".join(rng.choice(["R", "R", "R", "P"], n))
-    arm = Arm.from_dh(rows, kinds=kinds, convention=str(rng.choice(["standard", "modified"])), name="random")
+    arm = Arm.from_dh(
+        rows, kinds=kinds, convention=str(rng.choice(["standard", "modified"])), name="random"
+    )
     if kind == "table":
         joints = tuple(
-            replace(joint, bodies=(random_body(rng),), drive=random_drive(rng)) for joint in arm.description.joints
+            replace(joint, bodies=(random_body(rng),), drive=random_drive(rng))
+            for joint in arm.description.joints
         )
         arm = Arm(replace(arm.description, joints=joints))
     if kind == "tilted":
@@ -149,7 +187,9 @@ def verge_of(arm, motion, payload, friction):
         tau = loaded.inverse_dynamics(q, motion.qd(t), motion.qdd(t), friction=friction)
         most["torque"] = np.abs(tau).max(axis=0)
     guess = {name: 0.99 * np.maximum(values, 1e-6) for name, values in most.items()}
-    first = Limits.of(arm, lower=q.min(axis=0) - 0.01, upper=q.max(axis=0) + 0.01, **{"torque": np.inf} | guess)
+    first = Limits.of(
+        arm, lower=q.min(axis=0) - 0.01, upper=q.max(axis=0) + 0.01, **{"torque": np.inf} | guess
+    )
     found = arm.certify(motion, first, friction, payload)
     worst = {check.what: check.excess for check in found.checks}
     exact = {name: values * (1 + max(worst[name], 0) + 1e-9) for name, values in guess.items()}

@@ -10,7 +10,14 @@ from dhkit.errors import PlanningError
 from dhkit.planning.certificate import CollisionAvoidance
 from dhkit.planning.obstacles import Floor
 from dhkit.planning.second_check import Claim, recheck
-from planning.second_check.random_motions import KINDS, has_bodies, random_arm, random_case, random_scene, ranges
+from planning.second_check.random_motions import (
+    KINDS,
+    has_bodies,
+    random_arm,
+    random_case,
+    random_scene,
+    ranges,
+)
 
 PLANNED = ("library", "locked", "table", "urdf")
 """Kinds of arms of planned motions."""
@@ -26,7 +33,9 @@ def test_no_certificate_is_refuted(law, tmp_path):
         if case.certify().ok:
             certified += 1
             second = case.certify(independent=True).independent
-            law.holds("refuted certificates", len(second.refutations), 0, (k, case, second.refutations))
+            law.holds(
+                "refuted certificates", len(second.refutations), 0, (k, case, second.refutations)
+            )
     assert certified >= 0.9 * count
 
 
@@ -45,7 +54,9 @@ def test_no_planned_motion_is_refuted(law, tmp_path):
         scene = random_scene(rng, arm, ends)
         itself = bool(rng.random() < 0.5)
         gaps = arm.distance(ends, scene, self_collision=True)
-        scene = [item for item, gap in zip(scene, gaps.per_obstacle.T, strict=True) if gap.min() > 0]
+        scene = [
+            item for item, gap in zip(scene, gaps.per_obstacle.T, strict=True) if gap.min() > 0
+        ]
         itself = itself and bool(gaps.itself.min() > 0)
         options = {"obstacles": scene, "clearance": 0.005, "self_collision": itself}
         try:
@@ -68,7 +79,9 @@ def puma():
 
 @pytest.fixture(scope="module")
 def motion(puma):
-    return puma.quintic([0.1, 0.4, -0.3, 0.2, 0.5, 0.1], [1.2, -0.6, 0.5, -0.8, -0.4, 0.9], duration=1.0)
+    return puma.quintic(
+        [0.1, 0.4, -0.3, 0.2, 0.5, 0.1], [1.2, -0.6, 0.5, -0.8, -0.4, 0.9], duration=1.0
+    )
 
 
 def peaks(arm, motion, **torque_options):
@@ -144,10 +157,15 @@ def test_distances_are_refuted_and_no_foot_on_the_floor(puma, motion):
     ball = Obstacle.sphere(0.05, (0.5, 0.5, 0.4), name="ball")
     limits = Limits.of(puma, lower=-10, upper=10, **FREE)
     q = motion.q(np.linspace(0, 1, 300))
-    least = recheck(puma.description, motion, limits, claims=[Claim(3, ball, 1.0)]).smallest_distance
+    least = recheck(
+        puma.description, motion, limits, claims=[Claim(3, ball, 1.0)]
+    ).smallest_distance
     assert least >= puma.distance(q, [ball]).distance.min() - 1e-3  # shapes lie in capsules
     for kept, refuted in ((least, False), (1.2 * least + 2e-3, True)):
-        assert recheck(puma.description, motion, limits, claims=[Claim(3, ball, kept)]).ok is not refuted
+        assert (
+            recheck(puma.description, motion, limits, claims=[Claim(3, ball, kept)]).ok
+            is not refuted
+        )
     on_floor = [Claim(link, Floor(), 0.01) for link in range(1, 7)]
     assert recheck(puma.description, motion, limits, claims=on_floor).ok
     assert not recheck(puma.description, motion, limits, claims=[Claim(6, Floor(2.0), 0.01)]).ok
@@ -157,7 +175,9 @@ def test_a_certificate_that_overlooks_a_collision_is_refuted(puma, motion, monke
     through = puma.frames(motion.q(0.5))[..., 4, :3, 3]
     scene = [Obstacle.sphere(0.05, through, name="ball")]
     limits = Limits.of(puma, lower=-10, upper=10, **FREE)
-    monkeypatch.setattr(CollisionAvoidance, "shortfalls", lambda self, states: np.full(len(states.q), -1.0))
+    monkeypatch.setattr(
+        CollisionAvoidance, "shortfalls", lambda self, states: np.full(len(states.q), -1.0)
+    )
     assert puma.certify(motion, limits, obstacles=scene).ok
     certificate = puma.certify(motion, limits, obstacles=scene, independent=True)
     assert not certificate.ok and certificate.violation <= 0
@@ -170,5 +190,7 @@ def test_planned_motions_are_not_refuted(puma):
     scene = [Obstacle.box((0.1, 0.1, 0.6), (0.55, 0.2, 0.3), name="post"), Floor()]
     start, goal = [-0.6, -0.3, 0.2, 0, 0.5, 0], [1.4, -0.2, 0.1, 0, 0.4, 0]
     motion = puma.plan(start, goal, obstacles=scene, clearance=0.02, self_collision=True)
-    certificate = puma.certify(motion, obstacles=scene, clearance=0.02, self_collision=True, independent=True)
+    certificate = puma.certify(
+        motion, obstacles=scene, clearance=0.02, self_collision=True, independent=True
+    )
     assert certificate.ok and certificate.independent.smallest_distance < 0.1

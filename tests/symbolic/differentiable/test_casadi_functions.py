@@ -85,16 +85,27 @@ def test_layers_of_any_arm(law, description):
     load, more = (mass, com, inertia), {"wrench": wrench, "friction": Friction(0.1)}
     scale = np.abs(loaded.inverse_dynamics(q, qd, x, **more)).max()
     tau = functions.inverse_dynamics(q, qd, x, *load, wrench)
-    error = np.abs(np.array(tau).ravel() - loaded.inverse_dynamics(q, qd, x, **more)).max() / max(scale, 1e-3)
+    error = np.abs(np.array(tau).ravel() - loaded.inverse_dynamics(q, qd, x, **more)).max() / max(
+        scale, 1e-3
+    )
     law.holds("tau with friction, payload and wrench", error, 1e-11, description)
     back = np.array(functions.forward_dynamics(q, qd, tau, *load, wrench)).ravel()
     cond = np.linalg.cond(loaded.mass_matrix(q))
     error = np.abs(back - x).max() / max(1.0, np.abs(back).max(), scale) / max(1.0, cond * 1e-3)
     law.holds("forward of inverse with all layers", error, 1e-11, description)
-    for name in ("mass_matrix", "gravity_torque", "potential_energy", "coriolis_matrix", "kinetic_energy", "bias"):
+    for name in (
+        "mass_matrix",
+        "gravity_torque",
+        "potential_energy",
+        "coriolis_matrix",
+        "kinetic_energy",
+        "bias",
+    ):
         states = (q, qd)[: len(NAMES[name][0])]
         found, expected = getattr(functions, name)(*states, *load), getattr(loaded, name)(*states)
-        assert np.abs(np.array(found).ravel() - np.ravel(expected)).max() <= 1e-11 * max(1.0, np.abs(expected).max())
+        assert np.abs(np.array(found).ravel() - np.ravel(expected)).max() <= 1e-11 * max(
+            1.0, np.abs(expected).max()
+        )
 
 
 def test_a_payload_on_a_placed_arm(placed):

@@ -49,7 +49,10 @@ def evaluated(arm, expressions, states):
     """Return each expression's values at N states, shapes (N, ...)."""
     table, n = InertialTable.of(arm), arm.n
     symbols = [joint_symbols(name, n) for name in ("q", "qd", "x")]
-    outputs = [casadi.densify(function(table, *symbols[:count])) for function, count in expressions.values()]
+    outputs = [
+        casadi.densify(function(table, *symbols[:count]))
+        for function, count in expressions.values()
+    ]
     function = casadi.Function("dynamics", symbols, outputs)
     rows = [function(*row) for row in zip(*states, strict=True)]
     shapes = {"M": (n, n), "C": (n, n), "K": (), "V": ()}

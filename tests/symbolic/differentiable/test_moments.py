@@ -45,7 +45,10 @@ def moments(seed):
 def test_moments_turn_and_move_like_bodies(seed, angle, p):
     link, mass, com, J = moments(seed)
     c, s, p = np.cos(angle), np.sin(angle), np.array(p)
-    Rx, Rz = np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    Rx, Rz = (
+        np.array([[1, 0, 0], [0, c, -s], [0, s, c]]),
+        np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]),
+    )
     for found, R, shift in (
         (link, np.eye(3), np.zeros(3)),
         (link.about_x(c, s), Rx, np.zeros(3)),
@@ -65,7 +68,9 @@ def test_moments_turn_and_move_like_bodies(seed, angle, p):
 def test_regrouping_changes_no_equation(law, arm):
     law.samples(400)
     grouped = InertialTable.of(arm)
-    links = tuple(Moments.of_entries([float(x) for x in link.entries]) for link in exact_moments(arm))
+    links = tuple(
+        Moments.of_entries([float(x) for x in link.entries]) for link in exact_moments(arm)
+    )
     numbers = arm.numbers
     lift = -float(numbers.mass.sum() * (numbers.gravity @ numbers.T_world_base[:3, 3]))
     plain = replace(grouped, links=links, potential=lift)
@@ -86,7 +91,9 @@ def test_regrouping_changes_no_equation(law, arm):
         for table in (grouped, plain)
     ]
     for state in zip(*motions(arm, 3), strict=True):
-        for name, ours, theirs in zip(["tau", "M", "C", "g", "K", "V"], *(f(*state) for f in values), strict=True):
+        for name, ours, theirs in zip(
+            ["tau", "M", "C", "g", "K", "V"], *(f(*state) for f in values), strict=True
+        ):
             ours, theirs = np.array(ours), np.array(theirs)
             weight = float(numbers.mass.sum()) * 10 * max(1.0, arm.reach)
             size = max(np.abs(theirs).max(), weight)
@@ -108,7 +115,9 @@ def test_arms_of_a_pattern_share_an_expression():
     heavier = replace(
         arm,
         joints=tuple(
-            replace(j, bodies=(replace(j.body, mass=j.body.mass * Fraction(11, 10)),)) if i == 2 else j
+            replace(j, bodies=(replace(j.body, mass=j.body.mass * Fraction(11, 10)),))
+            if i == 2
+            else j
             for i, j in enumerate(arm.joints)
         ),
     )

@@ -61,7 +61,9 @@ def clashing(tmp_path):
 def read(ring, text):
     """Return the element that a text stands for, by the parser of robot files and answers."""
     written = notation(ring).names
-    names = {g.text: ring._element((g.kind, g.joint)) for g in ring.generators if g.kind != "constant"}
+    names = {
+        g.text: ring._element((g.kind, g.joint)) for g in ring.generators if g.kind != "constant"
+    }
     turning = [i for i in range(ring.n) if ring.kinds[i] == "R"]
     for k, first in enumerate(turning):
         s, c, joints = ring.sine(first), ring.cosine(first), str(first + 1)
@@ -185,7 +187,9 @@ def test_point_masses_give_craigs_equation(tmp_path):
         "m2*l2^2*(qdd1 + qdd2) + m2*l1*l2*c2*(2*qdd1 + qdd2) + (m1 + m2)*l1^2*qdd1 - m2*l1*l2*s2*qd2^2"
         " - 2*m2*l1*l2*s2*qd1*qd2 + m2*l2*g*(c1*c2 - s1*s2) + (m1 + m2)*l1*g*c1"
     )
-    second = "m2*l1*l2*c2*qdd1 + m2*l1*l2*s2*qd1^2 + m2*l2*g*(c1*c2 - s1*s2) + m2*l2^2*(qdd1 + qdd2)"
+    second = (
+        "m2*l1*l2*c2*qdd1 + m2*l1*l2*s2*qd1^2 + m2*l2*g*(c1*c2 - s1*s2) + m2*l2^2*(qdd1 + qdd2)"
+    )
     for element, text in zip(lag.tau, (first, second), strict=True):
         assert read(lag.arm.ring, plain_text(element)) == read(lag.arm.ring, text)
 
@@ -253,10 +257,16 @@ def test_sympy_gives_the_same_numbers(clashing):
     import sympy
 
     q, qd, qdd = (0.3, -0.7), (0.5, 1.1), (-0.2, 0.4)
-    for lag in (lagrangian(library_robot("planar2r")), lagrangian(library_robot("cart_pendulum")), clashing):
+    for lag in (
+        lagrangian(library_robot("planar2r")),
+        lagrangian(library_robot("cart_pendulum")),
+        clashing,
+    ):
         found = equations_sympy(quantities(lag, ["M", "tau", "V"]))
         state = {
-            f"{kind}{i + 1}": x for kind, values in (("q", q), ("qd", qd), ("qdd", qdd)) for i, x in enumerate(values)
+            f"{kind}{i + 1}": x
+            for kind, values in (("q", q), ("qd", qd), ("qdd", qdd))
+            for i, x in enumerate(values)
         }
         written = notation(lag.arm.ring).names
         values = dict(lag.description.numbers.values) | lag.constants

@@ -11,7 +11,13 @@ from hypothesis import given, strategies as st
 from acceptance import slow_if
 from conftest import require
 from dhkit.description import library_robot, read_robot
-from dhkit.symbolic.equations import equations_c, equations_matlab, equations_python, matlab_files, quantities
+from dhkit.symbolic.equations import (
+    equations_c,
+    equations_matlab,
+    equations_python,
+    matlab_files,
+    quantities,
+)
 from dhkit.symbolic.equations.programs import INPUTS, harmless, identifier
 from dhkit.symbolic.equations.python_code import FUNCTION_NAMES
 from dhkit.symbolic.exact.lagrangian import lagrangian
@@ -107,7 +113,9 @@ def test_python(name, symbols, what, equations):
         assert_equal(np.asarray(function(*(x[0] for x in inputs))), wanted[0])
 
 
-@pytest.mark.parametrize(("name", "symbols", "what"), [slow_if(case[0] in {"al5d", "jaco"}, *case) for case in CASES])
+@pytest.mark.parametrize(
+    ("name", "symbols", "what"), [slow_if(case[0] in {"al5d", "jaco"}, *case) for case in CASES]
+)
 def test_c(name, symbols, what, equations, tmp_path):
     gcc = require("gcc", "the compiler of Debian's gcc")
     lag, states = equations(name, symbols)
@@ -115,17 +123,26 @@ def test_c(name, symbols, what, equations, tmp_path):
     source, library = tmp_path / "equations.c", tmp_path / "equations.so"
     source.write_text(equations_c(lag, listed))
     subprocess.run([gcc, *STRICT, str(source), "-o", str(library), "-lm"], check=True)
-    subprocess.run([gcc, "-std=gnu17", "-fsyntax-only", "-Wall", "-Werror", str(source)], check=True)
+    subprocess.run(
+        [gcc, "-std=gnu17", "-fsyntax-only", "-Wall", "-Werror", str(source)], check=True
+    )
     functions = ctypes.CDLL(str(library))
     for quantity in listed:
         function = functions[f"{identifier(lag.description.name)}_{quantity.name}"]
         wanted = expected(lag, quantity, states)
         for k, row in enumerate(wanted):
-            assert_equal(called(function, [states[key][k] for key in INPUTS[quantity.name].split()], row.shape), row)
+            assert_equal(
+                called(
+                    function, [states[key][k] for key in INPUTS[quantity.name].split()], row.shape
+                ),
+                row,
+            )
 
 
 def called(function, inputs, shape):
-    pointers = [x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in map(np.ascontiguousarray, inputs)]
+    pointers = [
+        x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in map(np.ascontiguousarray, inputs)
+    ]
     if not shape:
         function.restype = ctypes.c_double
         return np.array(function(*pointers))
@@ -143,19 +160,28 @@ def test_matlab(name, symbols, what, equations, tmp_path):
         (tmp_path / file).write_text(text)
     lines = ["1;"]
     for k in range(3):
-        lines += [f"{key} = [{'; '.join(repr(float(x)) for x in values[k])}];" for key, values in states.items()]
+        lines += [
+            f"{key} = [{'; '.join(repr(float(x)) for x in values[k])}];"
+            for key, values in states.items()
+        ]
         for quantity in listed:
             call = f"{identifier(lag.description.name)}_{quantity.name}({', '.join(INPUTS[quantity.name].split())})"
             lines.append(f"printf('%.17g ', {call}.'); printf('\\n');")
     (tmp_path / "run_all.m").write_text("\n".join(lines))
     run = subprocess.run(
-        [octave, "--no-gui", "-qf", "run_all.m"], cwd=tmp_path, capture_output=True, text=True, check=True
+        [octave, "--no-gui", "-qf", "run_all.m"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     rows = iter(run.stdout.splitlines())
     wanted = [expected(lag, quantity, states) for quantity in listed]
     for k in range(3):
         for values in wanted:
-            assert_equal(np.array(next(rows).split(), dtype=float).reshape(values[k].shape), values[k])
+            assert_equal(
+                np.array(next(rows).split(), dtype=float).reshape(values[k].shape), values[k]
+            )
 
 
 def test_parameters_can_be_changed(equations):

@@ -82,7 +82,9 @@ def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_pat
         turned = np.minimum(away, np.abs(away - 2 * np.pi))
         assert np.nanmax(np.where(arm.numbers.prismatic, away, turned), initial=0) < AGREES
         angles = q[:, ~arm.numbers.prismatic]
-        assert np.nanmax(angles, initial=0) <= np.pi and np.nanmin(angles, initial=0) > -np.pi - 1e-12
+        assert (
+            np.nanmax(angles, initial=0) <= np.pi and np.nanmin(angles, initial=0) > -np.pi - 1e-12
+        )
 
 
 @pytest.mark.parametrize("language", ["c", "python"])
@@ -129,8 +131,15 @@ def test_exported_matlab_runs_in_octave(name, tmp_path):
     (path,) = derivation.export(tmp_path, "matlab")
     T = world_to_tool(arm, random_states(arm, 1, seed=4))[0]
     rows = "; ".join(" ".join(repr(float(x)) for x in row) for row in T)
-    run = ["octave", "--quiet", "--eval", f"cd {tmp_path}; q = {path.stem}([{rows}]); printf('%.17g\\n', q');"]
-    found = np.array(subprocess.run(run, check=True, capture_output=True, text=True).stdout.split(), dtype=float)
+    run = [
+        "octave",
+        "--quiet",
+        "--eval",
+        f"cd {tmp_path}; q = {path.stem}([{rows}]); printf('%.17g\\n', q');",
+    ]
+    found = np.array(
+        subprocess.run(run, check=True, capture_output=True, text=True).stdout.split(), dtype=float
+    )
     assert np.nanmax(np.abs(found.reshape(-1, arm.n) - derivation.solve(T)), initial=0) < AGREES
 
 
@@ -157,7 +166,11 @@ def test_text_says_everything(name):
     for i, kind in enumerate(arm.kinds, start=1):
         assert f"{'theta' if kind == 'R' else 'q'}{i} = " in text
     assert "None" not in text and "<" not in text.replace("<=", "")
-    for offset in (i for i, x in enumerate(derivation.chain.offsets, 1) if not x.is_zero and arm.kinds[i - 1] == "R"):
+    for offset in (
+        i
+        for i, x in enumerate(derivation.chain.offsets, 1)
+        if not x.is_zero and arm.kinds[i - 1] == "R"
+    ):
         assert f"q{offset} = theta{offset} " in text
 
 
@@ -205,12 +218,15 @@ def test_a_page_has_every_step_with_its_mathematics_and_figures(name):
     assert not tags.open
     assert (
         "<script" not in page
-        and "http" not in page.replace("http://www.w3.org", "").split("</h1>")[1].split("<h2>", 1)[1]
+        and "http"
+        not in page.replace("http://www.w3.org", "").split("</h1>")[1].split("<h2>", 1)[1]
     )
     assert tags.seen.count("section") == len(derivation.steps)
     wanted = sum(step.figure is not None for step in derivation.steps)
     figures = re.findall(r"<svg.*?</svg>", page, re.DOTALL)
-    assert len(figures) == wanted and wanted >= (0 if name == "pan_tilt" else 1) - (name == "cart_pendulum")
+    assert len(figures) == wanted and wanted >= (0 if name == "pan_tilt" else 1) - (
+        name == "cart_pendulum"
+    )
     for figure in figures:
         root = ElementTree.fromstring(figure)
         for text in root.iter("{http://www.w3.org/2000/svg}text"):
@@ -236,7 +252,9 @@ def test_sympys_solutions_satisfy_sympys_equations(name):
     objects, chain = derivation.sympy(), derivation.chain
     T = world_to_tool(arm, random_states(arm, 1, seed=8)[0])
     known = {sympy.Symbol(chain.names[f"p{axis}"]): T[i, 3] for i, axis in enumerate("xyz")}
-    known |= {sympy.Symbol(chain.names[f"r{i + 1}{j + 1}"]): T[i, j] for i in range(3) for j in range(3)}
+    known |= {
+        sympy.Symbol(chain.names[f"r{i + 1}{j + 1}"]): T[i, j] for i in range(3) for j in range(3)
+    }
     known |= {sympy.Symbol(k): v for k, v in chain.lengths.items()}
     checked = 0
     for step in derivation.steps:

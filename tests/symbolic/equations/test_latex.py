@@ -11,7 +11,14 @@ from acceptance import slow_if
 from conftest import require
 from dhkit.description import library_robot
 from dhkit.expressions import parse
-from dhkit.symbolic.equations import displays, equation_mathml, equations_latex, latex_document, latex_text, quantities
+from dhkit.symbolic.equations import (
+    displays,
+    equation_mathml,
+    equations_latex,
+    latex_document,
+    latex_text,
+    quantities,
+)
 from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.ring import Constant, Ring
@@ -70,11 +77,19 @@ def test_constants():
             Constant("m2"),
             Constant("sqrt(2)", half, square=parse("2")),
             Constant("cos(beta)", parse("cos(beta)", ["beta"])),
-            Constant("1/(m1 + m2)", 1 / parse("m1 + m2", ["m1", "m2"]), reciprocal_of=parse("m1 + m2", ["m1", "m2"])),
+            Constant(
+                "1/(m1 + m2)",
+                1 / parse("m1 + m2", ["m1", "m2"]),
+                reciprocal_of=parse("m1 + m2", ["m1", "m2"]),
+            ),
             Constant("1/m2", 1 / parse("m2", ["m2"]), reciprocal_of=parse("m2", ["m2"])),
         ],
     )
-    root, cosine, inverse = ring.constant("sqrt(2)"), ring.constant("cos(beta)"), ring.constant("1/(m1 + m2)")
+    root, cosine, inverse = (
+        ring.constant("sqrt(2)"),
+        ring.constant("cos(beta)"),
+        ring.constant("1/(m1 + m2)"),
+    )
     assert latex_text(root * ring.sine(0)) == r"\sqrt{2} s_{1}"
     assert latex_text(cosine * cosine * 3) == r"3 \cos^{2}(\beta)"
     assert latex_text(inverse * ring.position(1)) == r"\frac{q_{2}}{m_{1} + m_{2}}"
@@ -83,11 +98,17 @@ def test_constants():
 
 
 @pytest.mark.parametrize(
-    ("name", "what"), [("planar2r", "M C h g tau"), ("planar3r", "M C g"), ("cart_pendulum", "M C g")]
+    ("name", "what"),
+    [("planar2r", "M C h g tau"), ("planar3r", "M C g"), ("cart_pendulum", "M C g")],
 )
 def test_fits_a_page(name, what):
     shown = displays(quantities(lagrangian(library_robot(name)), what.split()))
-    lines = [line for display in shown for line in display.splitlines() if not line.startswith(("\\begin", "\\end"))]
+    lines = [
+        line
+        for display in shown
+        for line in display.splitlines()
+        if not line.startswith(("\\begin", "\\end"))
+    ]
     assert len(lines) + 1.2 * len(shown) < LINES_OF_A_PAGE
     assert all(latex_width(line) < LINE for line in lines if "pmatrix" not in line)
 
@@ -121,7 +142,9 @@ def latex_tokens(latex):
     """Count what a reader sees: letters, numbers, Greek letters, functions, accents and signs."""
     latex = latex.replace(r"\begin{pmatrix}", "(").replace(r"\end{pmatrix}", ")")
     latex = re.sub(
-        r"\\(begin|end)\{[^}]*\}|\\(mathrm|mathit|tfrac|frac|sqrt|[bB]igl|[bB]igr|qquad)(?![a-z])", " ", latex
+        r"\\(begin|end)\{[^}]*\}|\\(mathrm|mathit|tfrac|frac|sqrt|[bB]igl|[bB]igr|qquad)(?![a-z])",
+        " ",
+        latex,
     )
     latex = latex.replace(r"\\", " ").replace(r"\,", " ")
     counts = Counter()
@@ -157,6 +180,8 @@ def test_mathml_has_every_symbol_and_number(name, symbols, what):
 
 
 def test_mathml_of_names():
-    for latex in latex_names(["m_tool", "l_c1", "lc1", "payload", "MX3", "theta1", "Ixx2", "Jm2"]).values():
+    for latex in latex_names(
+        ["m_tool", "l_c1", "lc1", "payload", "MX3", "theta1", "Ixx2", "Jm2"]
+    ).values():
         letters = latex_tokens(latex.replace(r"\_", " "))
         assert letters - mathml_tokens(equation_mathml(latex)) == Counter()

@@ -23,7 +23,16 @@ from random_arms import arms, random_body
 def in_general_position(description) -> bool:
     """Whether no length or cosine is so near to zero that a numeric rank cannot tell."""
     numbers = description.numbers
-    sizes = np.abs([numbers.a, numbers.d, numbers.cos_alpha, numbers.sin_alpha, numbers.cos_theta, numbers.sin_theta])
+    sizes = np.abs(
+        [
+            numbers.a,
+            numbers.d,
+            numbers.cos_alpha,
+            numbers.sin_alpha,
+            numbers.cos_theta,
+            numbers.sin_theta,
+        ]
+    )
     sizes = np.concatenate([sizes.ravel(), np.abs(numbers.T_world_base[:3].ravel())])
     return bool(np.all((sizes == 0) | (sizes > 1e-2)))
 
@@ -37,7 +46,9 @@ NOISE = 1e-9
 def test_as_many_as_the_regressors_rank(name):
     description = library_robot(name)
     base = base_parameters(description)
-    assert sum(not parameter.startswith("Ia") for parameter in base.names) == numeric_rank(description)
+    assert sum(not parameter.startswith("Ia") for parameter in base.names) == numeric_rank(
+        description
+    )
 
 
 def test_a_puma_has_36_of_60():
@@ -51,7 +62,9 @@ def test_equations_in_base_parameters_are_the_full_ones(name):
     assert base_parameters(library_robot(name)).prove()
 
 
-@pytest.mark.parametrize("name", ["planar3r", "stanford", "cobra600", "al5d", slow_if(True, "puma560")])
+@pytest.mark.parametrize(
+    "name", ["planar3r", "stanford", "cobra600", "al5d", slow_if(True, "puma560")]
+)
 def test_base_parameters_agree_with_pinocchio(name):
     lag = base_parameters(library_robot(name)).lagrangian
     for error in errors(lag, 5, ("M", "C", "h", "g", "tau", "K")).values():
@@ -64,7 +77,9 @@ def test_base_parameters_agree_with_pinocchio(name):
 def test_random_arms(description):
     base = base_parameters(description)
     assert base.prove()
-    assert sum(not parameter.startswith("Ia") for parameter in base.names) == numeric_rank(description)
+    assert sum(not parameter.startswith("Ia") for parameter in base.names) == numeric_rank(
+        description
+    )
 
 
 def test_a_wrong_definition_is_found():
@@ -77,7 +92,10 @@ def test_a_wrong_definition_is_found():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar2r", "stanford", "puma560"])
 def test_torques_are_linear_in_the_parameters(name):
-    for lag in (lagrangian(library_robot(name), "inertial"), base_parameters(library_robot(name)).lagrangian):
+    for lag in (
+        lagrangian(library_robot(name), "inertial"),
+        base_parameters(library_robot(name)).lagrangian,
+    ):
         found = regressor(lag)
         assert found.prove()
         q, qd, qdd = states(lag.description, 3)
@@ -117,13 +135,21 @@ def test_names_that_the_file_has_are_left_to_it():
 
 @pytest.mark.parametrize(
     ("kinds", "twists"),
-    [("RP", (20, 0)), ("RPR", (30, 0, 0)), ("RPR", ("beta", 0, 0)), ("RRP", (0, 20, 0)), ("PRP", (20, 30, 0))],
+    [
+        ("RP", (20, 0)),
+        ("RPR", (30, 0, 0)),
+        ("RPR", ("beta", 0, 0)),
+        ("RRP", (0, 20, 0)),
+        ("PRP", (20, 30, 0)),
+    ],
 )
 def test_sliding_joints_behind_any_twist(kinds, twists):
     rows = [(0, 0.2, 0.3, twist) for twist in twists]
     bare = from_dh(rows, kinds=kinds, angle="deg", parameters={"beta": 0.3})
     rng = np.random.default_rng(0)
-    arm = replace(bare, joints=tuple(replace(joint, bodies=(random_body(rng),)) for joint in bare.joints))
+    arm = replace(
+        bare, joints=tuple(replace(joint, bodies=(random_body(rng),)) for joint in bare.joints)
+    )
     base = base_parameters(arm)
     assert base.prove()
     assert len(base) == numeric_rank(arm)

@@ -14,7 +14,16 @@ from hypothesis import given, settings
 import dhkit
 from acceptance import different_robots_first, sample_size, slow_if
 from dhkit import Arm
-from dhkit.description import Body, Convention, Description, Placement, Tool, from_dh, library_robot, with_uniform_links
+from dhkit.description import (
+    Body,
+    Convention,
+    Description,
+    Placement,
+    Tool,
+    from_dh,
+    library_robot,
+    with_uniform_links,
+)
 from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
 from dhkit.symbolic.exact.base_parameters import base_parameters
@@ -27,7 +36,16 @@ from exact_checks import errors
 from random_arms import arms
 
 TOLERANCE = 1e-12
-PROVED = ["planar2r", "planar3r", "polar_rp", "cart_pendulum", "pan_tilt", "cobra600", "stanford", "puma560"]
+PROVED = [
+    "planar2r",
+    "planar3r",
+    "polar_rp",
+    "cart_pendulum",
+    "pan_tilt",
+    "cobra600",
+    "stanford",
+    "puma560",
+]
 """The robots that both proofs are asked of."""
 
 
@@ -47,7 +65,11 @@ def sympy_rings(monkeypatch):
 @pytest.mark.parametrize("name", different_robots_first(dhkit.robots()))
 def test_exact_equations_agree_with_pinocchio(name, symbols, law):
     lag = lagrangian(library_robot(name), symbols)
-    quantities = ("M", "g", "V") if symbols == "inertial" and lag.n > 5 else ("M", "C", "h", "g", "tau", "K", "V")
+    quantities = (
+        ("M", "g", "V")
+        if symbols == "inertial" and lag.n > 5
+        else ("M", "C", "h", "g", "tau", "K", "V")
+    )
     for quantity, error in errors(lag, law.samples(1000), quantities).items():
         law.holds(f"exact {quantity}", error, TOLERANCE, name)
 
@@ -82,7 +104,9 @@ def test_a_coefficient_off_by_1e_9_is_found(name):
     wrong = lag.replaced(M=M).prove_euler_lagrange()
     assert not wrong
     acceleration, rates = ring.acceleration(0), (ring.rate(0), ring.rate(1))
-    assert wrong.difference[0] == tiny * (ring.cosine(1) * acceleration - ring.sine(1) * rates[0] * rates[1])
+    assert wrong.difference[0] == tiny * (
+        ring.cosine(1) * acceleration - ring.sine(1) * rates[0] * rates[1]
+    )
     assert wrong.difference[1] == tiny * Fraction(1, 2) * ring.sine(1) * rates[0] ** 2
     assert wrong.places == ((0,), (1,))
     assert "entry 1 differs by" in str(wrong)
@@ -125,10 +149,16 @@ def test_the_difference_is_what_the_mistake_makes(name, mistake):
         "potential_gradient_sign": 2 * lag.g,
         "half_forgotten": -_links_alone(lag),
         "half_squared": Fraction(1, 2) * _links_alone(lag),
-        "rotor_forgotten": np.array([a * ring.acceleration(i) for i, a in enumerate(lag.arm.armature)], dtype=object),
-        "kinetic_gradient_omitted": -np.array([lag.K.by_position(i) for i in range(n)], dtype=object),
-        "kinetic_gradient_sign": -2 * np.array([lag.K.by_position(i) for i in range(n)], dtype=object),
-        "mass_rate_omitted": np.array([[x.by_time() for x in row] for row in lag.M], dtype=object) @ _rates(lag),
+        "rotor_forgotten": np.array(
+            [a * ring.acceleration(i) for i, a in enumerate(lag.arm.armature)], dtype=object
+        ),
+        "kinetic_gradient_omitted": -np.array(
+            [lag.K.by_position(i) for i in range(n)], dtype=object
+        ),
+        "kinetic_gradient_sign": -2
+        * np.array([lag.K.by_position(i) for i in range(n)], dtype=object),
+        "mass_rate_omitted": np.array([[x.by_time() for x in row] for row in lag.M], dtype=object)
+        @ _rates(lag),
     }
     if mistake in expected:
         assert all(a == b for a, b in zip(proof.difference, expected[mistake], strict=True))
@@ -143,7 +173,9 @@ def _rates(lag):
 def _links_alone(lag):
     """M qdd + C qd without rotors."""
     ring = lag.arm.ring
-    rotors = np.array([a * ring.acceleration(i) for i, a in enumerate(lag.arm.armature)], dtype=object)
+    rotors = np.array(
+        [a * ring.acceleration(i) for i, a in enumerate(lag.arm.armature)], dtype=object
+    )
     return lag.tau - lag.g - rotors
 
 
@@ -203,7 +235,12 @@ def test_point_masses_at_the_ends_are_craigs():
         + m2 * l2 * g * c12
         + (m1 + m2) * l1 * g * c1
     )
-    tau2 = m2 * l1 * l2 * c2 * al1 + m2 * l1 * l2 * s2 * w1**2 + m2 * l2 * g * c12 + m2 * l2**2 * (al1 + al2)
+    tau2 = (
+        m2 * l1 * l2 * c2 * al1
+        + m2 * l1 * l2 * s2 * w1**2
+        + m2 * l2 * g * c12
+        + m2 * l2**2 * (al1 + al2)
+    )
     assert _equal(lag.tau, [tau1, tau2])
 
 
@@ -232,7 +269,10 @@ def test_the_seeds_second_option_is_the_textbooks_two_link_arm():
     h = HALF * m2 * l1 * l2 * sin2
     assert _equal(lag.M, [[M11, M12], [M12, third * m2 * l2**2]])
     assert _equal(lag.h, [-h * w2 * (2 * w1 + w2), h * w1**2])
-    assert _equal(lag.g, [(HALF * m1 + m2) * l1 * g * cos1 + HALF * m2 * l2 * g * cos12, HALF * m2 * l2 * g * cos12])
+    assert _equal(
+        lag.g,
+        [(HALF * m1 + m2) * l1 * g * cos1 + HALF * m2 * l2 * g * cos12, HALF * m2 * l2 * g * cos12],
+    )
 
 
 HALF, TWELFTH = Fraction(1, 2), Fraction(1, 12)
@@ -246,7 +286,9 @@ def _two_links(lag):
 
 
 def _equal(elements, expected) -> bool:
-    return all(a == b for a, b in zip(elements.flat, np.array(expected, dtype=object).flat, strict=True))
+    return all(
+        a == b for a, b in zip(elements.flat, np.array(expected, dtype=object).flat, strict=True)
+    )
 
 
 # Symbols
@@ -261,7 +303,9 @@ def test_parameters_made_of_others_are_written_in_those():
 def test_fractions_of_parameters_cancel():
     """The centre of mass of a link with its payload is over m2 + mp; equations have no such fraction left."""
     planar = library_robot("planar2r")
-    loaded = replace(planar, parameters=type(planar.parameters)(dict(planar.parameters) | {"mp": exact(0.7)}))
+    loaded = replace(
+        planar, parameters=type(planar.parameters)(dict(planar.parameters) | {"mp": exact(0.7)})
+    )
     first, last = Arm(loaded).with_payload("mp", com=(0.05, 0, 0)).description.joints
     lag = lagrangian(replace(loaded, joints=(first, replace(last, bodies=(last.body,)))))
     assert any("/" in text for text in lag.arm.ring.constants)
@@ -279,31 +323,45 @@ def test_fractions_of_parameters_cancel():
     bare = lagrangian(planar).arm.ring
     assert bare is not ring
     lever = l2 + Fraction(1, 20)
-    expected = ring.constant("m2") * l2**2 * Fraction(1, 3) + mp * lever**2 - mp * (lever**2 - lever * lever)
+    expected = (
+        ring.constant("m2") * l2**2 * Fraction(1, 3)
+        + mp * lever**2
+        - mp * (lever**2 - lever * lever)
+    )
     assert lag.M[1, 1] == expected
 
 
 def test_inertial_symbols_have_the_field_s_names():
     constants = lagrangian(library_robot("puma560"), "inertial").constants
-    assert {"m2", "rx2", "ry2", "rz2", "Ixx2", "Iyz2", "Jm2", "G2", "a2", "d3", "g"} <= set(constants)
+    assert {"m2", "rx2", "ry2", "rz2", "Ixx2", "Iyz2", "Jm2", "G2", "a2", "d3", "g"} <= set(
+        constants
+    )
     assert constants["m2"] == 17.4
     assert constants["rx2"] == pytest.approx(17.4 * -0.3638, rel=1e-15)
 
 
 def test_names_that_the_file_has_are_left_to_it():
     description = from_dh(
-        [(0, 0, "a1", 0), (0, 0, "g", 0)], parameters={"a1": 0.3, "g": 0.2}, name="named_like_symbols"
+        [(0, 0, "a1", 0), (0, 0, "g", 0)],
+        parameters={"a1": 0.3, "g": 0.2},
+        name="named_like_symbols",
     )
     body = library_robot("planar2r").joints[0].body
-    number = Body(exact(2), (exact(-0.1), exact(0), exact(0)), body.inertia.__class__(zz=exact(0.1)))
-    description = replace(description, joints=tuple(replace(joint, bodies=(number,)) for joint in description.joints))
+    number = Body(
+        exact(2), (exact(-0.1), exact(0), exact(0)), body.inertia.__class__(zz=exact(0.1))
+    )
+    description = replace(
+        description, joints=tuple(replace(joint, bodies=(number,)) for joint in description.joints)
+    )
     for symbols in ("file", "inertial"):
         for error in errors(lagrangian(description, symbols), 5).values():
             assert error <= TOLERANCE
 
 
 def test_a_missing_body_is_said():
-    with pytest.raises(DescriptionError, match=r"joint 2 \(joint2\) has no body.*with_uniform_links"):
+    with pytest.raises(
+        DescriptionError, match=r"joint 2 \(joint2\) has no body.*with_uniform_links"
+    ):
         lagrangian(_half_bodied())
 
 
@@ -337,7 +395,9 @@ def test_exact_puma_without_flint_is_fast(law):
     start = perf_counter()
     lag = lagrangian(description, "inertial")
     lag.C, lag.g, lag.tau, lag.K  # noqa: B018 - derived when first asked for
-    law.takes("exact PUMA, all inertial parameters symbolic, sympy alone, s", perf_counter() - start, 2.0)
+    law.takes(
+        "exact PUMA, all inertial parameters symbolic, sympy alone, s", perf_counter() - start, 2.0
+    )
     start = perf_counter()
     assert lag.prove_euler_lagrange()
     assert lag.prove_skew_symmetry()
@@ -361,7 +421,9 @@ def test_exact_puma_with_flint_is_faster(law):
     start = perf_counter()
     lag = lagrangian(library_robot("puma560"), "inertial")
     lag.C, lag.g, lag.tau  # noqa: B018
-    law.takes("exact PUMA, all inertial parameters symbolic, python-flint, s", perf_counter() - start, 0.3)
+    law.takes(
+        "exact PUMA, all inertial parameters symbolic, python-flint, s", perf_counter() - start, 0.3
+    )
 
 
 def test_results_are_pickled():
@@ -373,7 +435,9 @@ def test_results_are_pickled():
     assert again.prove_euler_lagrange()
 
 
-@pytest.mark.parametrize("mistake", [name for name in MISTAKES if name != "com_rotation_transposed"])
+@pytest.mark.parametrize(
+    "mistake", [name for name in MISTAKES if name != "com_rotation_transposed"]
+)
 def test_mistakes_mean_the_same_in_both_conventions(mistake):
     """The same two rods in both tables: frames lie at the links' far ends, or at their joints.
 
@@ -416,7 +480,9 @@ def test_the_heights_that_students_write():
 
 def test_wrong_arguments_are_said():
     lag = lagrangian(library_robot("planar2r"))
-    with pytest.raises(TypeError, match="mistakes is 'omega_relative'; expected a set of identities"):
+    with pytest.raises(
+        TypeError, match="mistakes is 'omega_relative'; expected a set of identities"
+    ):
         derive(lag.description, "omega_relative")
     with pytest.raises(TypeError, match="mistake 1: expected MadeAt"):
         derive(lag.description, {1})
@@ -436,5 +502,9 @@ def test_wrong_arguments_are_said():
 def test_constants_are_those_that_are_printed():
     arm = from_dh([(0, 0, 0.3, "beta"), (0, 0, 0.2, 0)], parameters={"beta": 0.3})
     lag = lagrangian(with_uniform_links(arm))
-    assert {str(symbol) for symbol in lag.sympy("g")["g"].free_symbols} <= {"q1", "q2", *lag.constants}
+    assert {str(symbol) for symbol in lag.sympy("g")["g"].free_symbols} <= {
+        "q1",
+        "q2",
+        *lag.constants,
+    }
     assert lag.constants["beta"] == 0.3

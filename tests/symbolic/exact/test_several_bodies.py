@@ -9,7 +9,15 @@ from hypothesis import given, settings, strategies as st
 
 from acceptance import sample_size
 from dhkit import Arm
-from dhkit.description import Body, Description, Inertia, Named, from_toml, library_robot, with_payload
+from dhkit.description import (
+    Body,
+    Description,
+    Inertia,
+    Named,
+    from_toml,
+    library_robot,
+    with_payload,
+)
 from dhkit.expressions import exact, substitute
 from dhkit.symbolic.exact.base_parameters import base_parameters
 from dhkit.symbolic.exact.lagrangian import lagrangian
@@ -64,7 +72,9 @@ def load(x, y="0"):
 def robot(name, convention, *rows):
     """Return a robot of rows (type, a, alpha, d, bodies)."""
     keys = ("type", "a", "alpha", "d")
-    joints = (ROW.format(**dict(zip(keys, row, strict=False)), bodies=", ".join(row[4:])) for row in rows)
+    joints = (
+        ROW.format(**dict(zip(keys, row, strict=False)), bodies=", ".join(row[4:])) for row in rows
+    )
     return from_toml(HEAD.format(name=name, convention=convention) + "".join(joints))
 
 
@@ -126,11 +136,19 @@ def joined_by_hand(description: Description) -> Description:
             total = Fraction(0)
             for m, c, tensor in parts:
                 lever = [x - y for x, y in zip(c, com, strict=True)]
-                total += tensor[i][j] - m * lever[i] * lever[j] + (m * sum(x * x for x in lever) if i == j else 0)
+                total += (
+                    tensor[i][j]
+                    - m * lever[i] * lever[j]
+                    + (m * sum(x * x for x in lever) if i == j else 0)
+                )
             return exact(total)
 
-        inertia = Inertia(entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(1, 2), entry(0, 2))
-        joints.append(replace(joint, bodies=(Body(exact(mass), tuple(exact(x) for x in com), inertia),)))
+        inertia = Inertia(
+            entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(1, 2), entry(0, 2)
+        )
+        joints.append(
+            replace(joint, bodies=(Body(exact(mass), tuple(exact(x) for x in com), inertia),))
+        )
     return replace(description, joints=tuple(joints))
 
 
@@ -147,14 +165,20 @@ def test_both_derivations_agree_exactly_and_with_pinocchio(name, symbols):
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_equations_are_polynomials_in_the_parameters(name):
-    assert set(lagrangian(ROBOTS[name]).arm.ring.constants) <= {*ROBOTS[name].parameters, "sqrt(2)", "sqrt(3)"}
+    assert set(lagrangian(ROBOTS[name]).arm.ring.constants) <= {
+        *ROBOTS[name].parameters,
+        "sqrt(2)",
+        "sqrt(3)",
+    }
 
 
 @settings(max_examples=sample_size(25, quick=8))
 @given(arms(most=3), st.integers(2, 3), st.integers(0, 10**6))
 def test_random_arms_with_bodies_agree(arm, count, seed):
     rng = np.random.default_rng(seed)
-    joints = (replace(joint, bodies=tuple(random_body(rng) for _ in range(count))) for joint in arm.joints)
+    joints = (
+        replace(joint, bodies=tuple(random_body(rng) for _ in range(count))) for joint in arm.joints
+    )
     lag = lagrangian(replace(arm, joints=tuple(joints)), "none")
     assert lag.prove_euler_lagrange()
     assert max(errors(lag, 5).values()) < TOLERANCE
@@ -167,7 +191,9 @@ def test_an_arm_is_the_one_whose_links_are_joined_by_hand(name):
     ours, theirs = lagrangian(ours, "none"), lagrangian(theirs, "none")
     ring = ours.arm.ring
     for quantity in ("M", "g", "tau", "K", "V"):
-        pairs = zip(np.ravel(getattr(ours, quantity)), np.ravel(getattr(theirs, quantity)), strict=True)
+        pairs = zip(
+            np.ravel(getattr(ours, quantity)), np.ravel(getattr(theirs, quantity)), strict=True
+        )
         assert all(a == translated(b, ring, {}) for a, b in pairs), quantity
 
 

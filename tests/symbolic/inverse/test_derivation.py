@@ -8,7 +8,15 @@ from hypothesis import assume, given, settings
 
 import dhkit
 from acceptance import sample_size
-from dhkit.description import from_dh, from_toml, library_robot, pose, with_base, with_tool, world_to_tool
+from dhkit.description import (
+    from_dh,
+    from_toml,
+    library_robot,
+    pose,
+    with_base,
+    with_tool,
+    world_to_tool,
+)
 from dhkit.errors import DescriptionError
 from dhkit.kinematics import classify, inverse_kinematics
 from dhkit.symbolic import inverse_derivation, symbolic_kinematics
@@ -58,10 +66,14 @@ def smallest_measures(derivation, T):
             for step in derivation.steps:
                 if step.form is None:
                     continue
-                letters = {k: np.broadcast_to(values.of(x), len(T)) for k, x in step.form.letters.items()}
+                letters = {
+                    k: np.broadcast_to(values.of(x), len(T)) for k, x in step.form.letters.items()
+                }
                 kind = type(step.form).__name__
                 if kind in ("Circle", "Square", "CosineAndSquare"):
-                    measure = np.sqrt(np.maximum(np.broadcast_to(step.form.solve(letters, 1.0)[1], len(T)), 0))
+                    measure = np.sqrt(
+                        np.maximum(np.broadcast_to(step.form.solve(letters, 1.0)[1], len(T)), 0)
+                    )
                 elif kind in ("Line", "Flip", "Direction"):
                     size = np.hypot(letters["X"], letters["Y"]) * np.abs(
                         letters.get("k", 1.0) if kind == "Direction" else 1
@@ -97,10 +109,15 @@ def hold(law, arm, derivation, q, where):
     )
     if derivation.family.aims:
         return
-    for name, rows, required in (("regular", regular, CLOSES), ("near singular", ~regular, CLOSES_NEAR)):
+    for name, rows, required in (
+        ("regular", regular, CLOSES),
+        ("near singular", ~regular, CLOSES_NEAR),
+    ):
         some = np.where((solved & rows)[..., None], ours, np.nan)
         if (solved & rows).any():
-            law.holds(f"closure, {name}", positions_close(arm, some, T, derivation), required, where)
+            law.holds(
+                f"closure, {name}", positions_close(arm, some, T, derivation), required, where
+            )
 
 
 def positions_close(arm, q, T, derivation):
@@ -129,7 +146,9 @@ def special_states(arm, count, seed):
     rng = np.random.default_rng(seed)
     quarters = rng.integers(-2, 3, (count, arm.n)) * np.pi / 2
     off = rng.choice([0, 1e-15, 1e-12, 1e-9, 1e-6, 0.3, 1.0], (count, arm.n))
-    return np.where(arm.numbers.prismatic, rng.choice([0.1, 0.3, 0.5], (count, arm.n)), quarters) + off
+    return (
+        np.where(arm.numbers.prismatic, rng.choice([0.1, 0.3, 0.5], (count, arm.n)), quarters) + off
+    )
 
 
 @pytest.mark.parametrize("name", LIBRARY)
@@ -145,14 +164,19 @@ def test_solutions_at_singular_poses_reach_them(law, name):
         is_solved |= np.abs(np.sin(q[:, 4])) < 2e-6
     assert is_solved.all(), (name, q[~is_solved][:3])
     if not derivation.family.aims:
-        law.holds("closure, singular", positions_close(arm, found, T, derivation), CLOSES_NEAR, name)
+        law.holds(
+            "closure, singular", positions_close(arm, found, T, derivation), CLOSES_NEAR, name
+        )
 
 
 def check_family(law, arm):
     law.samples(200)
     found = classify(arm)
     assume(found.family is not None)
-    assume(min(float(np.min(found.fit.parameters.get(key, 1.0))) for key in ("L2", "L3", "L")) > 1e-3 * arm.reach)
+    assume(
+        min(float(np.min(found.fit.parameters.get(key, 1.0))) for key in ("L2", "L3", "L"))
+        > 1e-3 * arm.reach
+    )
     derivation = inverse_derivation(arm)
     assert derivation.family.name == found.name
     for proof in derivation.identities():
@@ -188,7 +212,12 @@ def test_any_arm_of_few_joints(law, arm):
 
 def test_numbers_near_zero_and_right_angles_are_read_as_the_kernels_read_them(law):
     right, tiny = 1.5707963267949, 1e-15  # 13 digits, and what an import leaves of 0
-    rows = [(0, 0.6, tiny, -right), (0, 0.15, 0.43, 0), (0, 0, 0.02, right), (0, 0.43, tiny, -right)]
+    rows = [
+        (0, 0.6, tiny, -right),
+        (0, 0.15, 0.43, 0),
+        (0, 0, 0.02, right),
+        (0, 0.43, tiny, -right),
+    ]
     arm = from_dh([*rows, (0, tiny, 0, right), (0, 0.06, 0, tiny)], name="rounded")
     derivation = inverse_derivation(arm)
     assert derivation.family.name == classify(arm).name
@@ -201,7 +230,13 @@ def test_numbers_near_zero_and_right_angles_are_read_as_the_kernels_read_them(la
     assert np.nanmax(gaps(arm, T, ours, kernels.q)[both]) < 1e-9
     read = derivation.chain.description
     hold(law, read, derivation, random_states(read, 1000), "rounded")
-    slide = [(0, tiny, 0, -right), (0, tiny, 0, -right), (1e-250, 0, 0.5, 0), (0, 0, 0, right), (0, 0, 0, right)]
+    slide = [
+        (0, tiny, 0, -right),
+        (0, tiny, 0, -right),
+        (1e-250, 0, 0.5, 0),
+        (0, 0, 0, right),
+        (0, 0, 0, right),
+    ]
     arm = from_dh([*slide, (0, 0.1, 0, 0)], kinds="RRPRRR")
     hold(law, arm, inverse_derivation(arm), random_states(arm, 1000), "rounded slide")
 
@@ -227,13 +262,28 @@ def test_a_lemmas_solution_is_what_is_evaluated(form):
     x, z, (a, b, k) = rng.uniform(-3, 3, 500), rng.uniform(-1, 1, 500), rng.uniform(-2, 2, (3, 500))
     c, s = np.cos(x), np.sin(x)
     cases = {
-        "Circle": ({"A": a, "B": b, "C": a * c + b * s}, lambda x: [a * np.cos(x) + b * np.sin(x) - (a * c + b * s)]),
+        "Circle": (
+            {"A": a, "B": b, "C": a * c + b * s},
+            lambda x: [a * np.cos(x) + b * np.sin(x) - (a * c + b * s)],
+        ),
         "Line": ({"X": k * c, "Y": k * s}, lambda x: [k * c * np.sin(x) - k * s * np.cos(x)]),
         "Direction": ({"k": k, "X": k * c, "Y": k * s}, lambda x: [np.cos(x) - c, np.sin(x) - s]),
-        "Flip": ({"k": k, "X": k * c, "Y": k * s}, lambda x: [np.cos(x) ** 2 - c**2, np.sin(x) ** 2 - s**2]),
-        "CosineAndSquare": ({"X": c, "S": s * s}, lambda x: [np.cos(x) - c, np.sin(x) ** 2 - s * s]),
-        "Turned": ({"U": a, "V": b, "X": a * c - b * s, "Y": a * s + b * c}, lambda x: [np.cos(x) - c, np.sin(x) - s]),
-        "Square": ({"M": a, "S": (z + a) ** 2, "Q": 1 + a * a}, lambda x: [(x + a) ** 2 - (z + a) ** 2]),
+        "Flip": (
+            {"k": k, "X": k * c, "Y": k * s},
+            lambda x: [np.cos(x) ** 2 - c**2, np.sin(x) ** 2 - s**2],
+        ),
+        "CosineAndSquare": (
+            {"X": c, "S": s * s},
+            lambda x: [np.cos(x) - c, np.sin(x) ** 2 - s * s],
+        ),
+        "Turned": (
+            {"U": a, "V": b, "X": a * c - b * s, "Y": a * s + b * c},
+            lambda x: [np.cos(x) - c, np.sin(x) - s],
+        ),
+        "Square": (
+            {"M": a, "S": (z + a) ** 2, "Q": 1 + a * a},
+            lambda x: [(x + a) ** 2 - (z + a) ** 2],
+        ),
         "Sliding": ({"Z": z}, lambda x: [x - z]),
         "Remainder": ({"X": c, "Y": s}, lambda x: [np.cos(x) - c, np.sin(x) - s]),
     }
@@ -258,7 +308,11 @@ def test_nothing_is_used_before_it_is_found(name):
             known.add(definition.name)
         if step.form is None:
             continue
-        used = [x for letter, x in step.form.letters.items() if (type(step.form).__name__, letter) != ("Flip", "k")]
+        used = [
+            x
+            for letter, x in step.form.letters.items()
+            if (type(step.form).__name__, letter) != ("Flip", "k")
+        ]
         assert names_in(used) <= known, step.title
         assert set().union(*map(joints_in, used)) <= joints, step.title
         if step.unknown.joint is None:
@@ -277,14 +331,19 @@ def joints_in(element):
 def test_the_pose_put_in_is_that_of_the_symbolic_kinematics():
     """Base, table and tool by another route: the product of the textbook's transforms, in numbers."""
     arm = with_tool(
-        with_base(library_robot("al5d"), pose((0.1, -0.2, 0.3), euler=(0.2, 0.5, -1.0))), pose((0.1, 0, 0.2))
+        with_base(library_robot("al5d"), pose((0.1, -0.2, 0.3), euler=(0.2, 0.5, -1.0))),
+        pose((0.1, 0, 0.2)),
     )
     q = np.random.default_rng(3).uniform(-2, 2, (20, arm.n))
     derivation, T = inverse_derivation(arm), symbolic_kinematics(arm).T.evaluate(q)
     chain = derivation.chain
     theta = q + np.array([chain.number(offset) for offset in chain.offsets])
-    values = chain.ring.values({**dict.fromkeys(chain.names.values(), math.nan), **chain.values}, theta)
-    ours = np.stack([np.broadcast_to(entry.value(values), 20) for entry in chain.tool_pose[:3].flat], axis=1)
+    values = chain.ring.values(
+        {**dict.fromkeys(chain.names.values(), math.nan), **chain.values}, theta
+    )
+    ours = np.stack(
+        [np.broadcast_to(entry.value(values), 20) for entry in chain.tool_pose[:3].flat], axis=1
+    )
     assert np.abs(ours.reshape(20, 3, 4) - T[:, :3]).max() < 1e-14
 
 
@@ -305,7 +364,9 @@ l1 = 0.3
         ("0", "0", "0.1"),
     ]
     for a, alpha, d in rows:
-        text += f'[[joint]]\ntype = "revolute"\na = "{a}"\nalpha = "{alpha}"\nd = "{d}"\ntheta = 0\n'
+        text += (
+            f'[[joint]]\ntype = "revolute"\na = "{a}"\nalpha = "{alpha}"\nd = "{d}"\ntheta = 0\n'
+        )
     chance = inverse_derivation(from_toml(text))
     assert chance.family.name == "elbow_wrist" and chance.prove(20)
     assert "only with the values of the parameters" in chance.notes[0]
@@ -316,13 +377,19 @@ l1 = 0.3
 @pytest.mark.parametrize(
     ("rows", "kinds", "words"),
     [
-        ([(0, 0.1, 0, 0.5), (0, 0, 0.4, 0), (0, 0, 0, 1.5)], "RRR", "axes 1 and 2 are at 28.65 degrees and 0 mm apart"),
+        (
+            [(0, 0.1, 0, 0.5), (0, 0, 0.4, 0), (0, 0, 0, 1.5)],
+            "RRR",
+            "axes 1 and 2 are at 28.65 degrees and 0 mm apart",
+        ),
         ([(0, 0, 0, 0.3)], "R", "one joint alone meets no pose"),
         ([(0, 0, 0, 1.0)] * 7, "RRRRRRR", "7 joints have more freedom than a pose asks for"),
     ],
 )
 def test_an_arm_without_a_closed_form_says_why(rows, kinds, words):
-    with pytest.raises(DescriptionError, match=f"no closed form is known for these .*{words}.*use arm.ik_numeric"):
+    with pytest.raises(
+        DescriptionError, match=f"no closed form is known for these .*{words}.*use arm.ik_numeric"
+    ):
         inverse_derivation(from_dh(rows, kinds=kinds))
 
 
@@ -338,13 +405,18 @@ def test_a_wrist_whose_axes_miss_says_by_how_much():
     ]
     with pytest.raises(DescriptionError) as raised:
         inverse_derivation(from_dh(rows))
-    assert "axes 5 and 6 miss each other by 2 mm, axes 4 and 6 meet axis 5 10 mm apart" in str(raised.value)
+    assert "axes 5 and 6 miss each other by 2 mm, axes 4 and 6 meet axis 5 10 mm apart" in str(
+        raised.value
+    )
 
 
 def test_an_arm_has_it_in_its_symbolic_kinematics(tmp_path):
     arm = dhkit.Arm.load("puma560")
     assert arm.symbolic.ik is arm.symbolic.ik
-    assert repr(arm.symbolic.ik) == "<InverseDerivation of puma560: spherical wrist, axes 2 and 3 parallel, 8 steps>"
+    assert (
+        repr(arm.symbolic.ik)
+        == "<InverseDerivation of puma560: spherical wrist, axes 2 and 3 parallel, 8 steps>"
+    )
     assert [path.name for path in arm.export_ik(tmp_path)] == ["puma560_ik.c", "puma560_ik.h"]
     with pytest.raises(ValueError, match="language is 'rust'; expected one of c, python, matlab"):
         arm.export_ik(tmp_path, "rust")

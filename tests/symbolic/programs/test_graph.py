@@ -6,7 +6,14 @@ import pytest
 from hypothesis import given, strategies as st
 
 from dhkit.description import library_robot, robots, world_to_frames, world_to_tool
-from dhkit.symbolic import Graph, SymbolicTable, jacobian, jacobian_dot, joint_symbols, table_pattern
+from dhkit.symbolic import (
+    Graph,
+    SymbolicTable,
+    jacobian,
+    jacobian_dot,
+    joint_symbols,
+    table_pattern,
+)
 from random_arms import states, tables
 
 
@@ -50,7 +57,9 @@ EXPRESSIONS = {
     "choice": casadi.if_else(x[0] < x[1], x[2], casadi.if_else(x[0] <= 0, x[1], 3.0)),
     "choice of roots": casadi.if_else(x[0] > 0, casadi.sqrt(x[0]), casadi.sqrt(-x[0])),
     "logic": casadi.if_else(casadi.logic_and(x[0] > 0, casadi.logic_not(x[1] > 0)), 1.0, 2.0),
-    "logic with constants": casadi.if_else(casadi.logic_or(casadi.SX(0.0), x[1] == x[2]), 1.0, x[0]),
+    "logic with constants": casadi.if_else(
+        casadi.logic_or(casadi.SX(0.0), x[1] == x[2]), 1.0, x[0]
+    ),
     "extremes": casadi.fmin(x[0], x[1]) + casadi.fmax(x[1], x[2]) + casadi.floor(x[0]),
     "not equal": casadi.if_else(x[0] != x[1], x[2], 0.0),
 }
@@ -67,7 +76,9 @@ def test_a_program_computes_its_expression(name):
 
 
 def test_common_subexpressions_are_one_node_and_constants_are_worked_out():
-    graph = Graph.of("program", {"x": x}, {"y": (x[0] * x[1] + 1) * (x[1] * x[0] + 1), "z": casadi.SX(2) * 3})
+    graph = Graph.of(
+        "program", {"x": x}, {"y": (x[0] * x[1] + 1) * (x[1] * x[0] + 1), "z": casadi.SX(2) * 3}
+    )
     assert [node.operation for node in graph.nodes].count("multiply") == 2
     assert len(set(graph.nodes)) == len(graph.nodes)
     assert evaluate(graph, [1, 2, 3])[1] == 6
@@ -114,7 +125,9 @@ def test_symbolic_jacobians_differentiate_the_tool(name):
     table = SymbolicTable.of(arm)
     T, J = table.world_to_tool(q), jacobian(table, q)
     velocity = casadi.jtimes(T[:3, 3], q, qd) - J[:3, :] @ qd
-    spin = casadi.jtimes(casadi.vec(T[:3, :3]), q, qd) - casadi.vec(casadi.skew(J[3:, :] @ qd) @ T[:3, :3])
+    spin = casadi.jtimes(casadi.vec(T[:3, :3]), q, qd) - casadi.vec(
+        casadi.skew(J[3:, :] @ qd) @ T[:3, :3]
+    )
     rate = casadi.vec(jacobian_dot(table, q, qd)) - casadi.jtimes(casadi.vec(J), q, qd)
     f = casadi.Function("f", [q, qd], [casadi.vertcat(velocity, spin, rate)])
     for state, rates in zip(states(arm, 5), states(arm, 5, 1), strict=True):

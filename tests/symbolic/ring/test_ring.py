@@ -124,7 +124,9 @@ def test_other_angles_are_symbols_that_add_up(texts):
     (c1, s1), (c2, s2), (c3, s3) = (ring.direction(angle) for angle in angles)
     assert c1 * c2 - s1 * s2 == c3
     assert s1 * c2 + c1 * s2 == s3
-    values = {text: value_of(constant, {"beta": exact(0.7)}) for text, constant in constants.found.items()}
+    values = {
+        text: value_of(constant, {"beta": exact(0.7)}) for text, constant in constants.found.items()
+    }
     numbers = ring.values(values, np.zeros(1))
     assert s3.value(numbers) == pytest.approx(np.sin(float(substituted(angles[2]))), abs=1e-15)
 
@@ -143,7 +145,14 @@ def test_what_is_a_symbol_though_a_number_is_said():
 
 def test_expressions_are_read_exactly():
     names = ["l1", "l2", "m1", "m2"]
-    texts = ["m1*l1^2/12", "(m1*l1 + m2*l2)/(m1 + m2)", "sqrt(l1^2 + l2^2)", "1/m1", "sqrt(2)*sqrt(3)", "pi*l1^2"]
+    texts = [
+        "m1*l1^2/12",
+        "(m1*l1 + m2*l2)/(m1 + m2)",
+        "sqrt(l1^2 + l2^2)",
+        "1/m1",
+        "sqrt(2)*sqrt(3)",
+        "pi*l1^2",
+    ]
     expressions = [parse(text, names=names) for text in texts]
     ring = Ring("R", list(Constants.of(expressions, []).found.values()))
     steiner, com, diagonal, inverse, six, area = map(ring.read, expressions)

@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.bench.contenders import QUANTITIES, Call, Contender, Mode, Task, UnavailableError, Workload, one_by_one
+from dhkit.bench.contenders import (
+    QUANTITIES,
+    Call,
+    Contender,
+    Mode,
+    Task,
+    UnavailableError,
+    Workload,
+    one_by_one,
+)
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 
@@ -62,7 +71,9 @@ def _into_out(quantity: str) -> Callable[[Workload], Task]:
         function = method(workload.arm, quantity)
         inputs = workload.inputs(quantity)
         if quantity == "ik" and workload.arm.family.fit is None:
-            raise UnavailableError("arm.ik takes out= only where a closed form decides how many branches there are")
+            raise UnavailableError(
+                "arm.ik takes out= only where a closed form decides how many branches there are"
+            )
 
         def prepare(items: int) -> Callable[[], Any]:
             chosen = [x[:items] for x in inputs]
@@ -134,7 +145,11 @@ def _mapped(quantity: str) -> Callable[[Workload], Task]:
 
         def answers(k: int) -> list[Array]:
             result = np.array(prepare(k)())
-            return list(result.T) if result.shape == (n, k) else list(result.reshape(n, k, n).swapaxes(0, 1))
+            return (
+                list(result.T)
+                if result.shape == (n, k)
+                else list(result.reshape(n, k, n).swapaxes(0, 1))
+            )
 
         return Task(prepare, answers)
 

@@ -6,7 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError, Workload, import_peer, single_task
+from dhkit.bench.contenders import (
+    Call,
+    Contender,
+    Mode,
+    Task,
+    UnavailableError,
+    Workload,
+    import_peer,
+    single_task,
+)
 from dhkit.bench.geometry import JointAxes, joint_axes
 from dhkit.description import Array
 
@@ -35,13 +44,18 @@ def _single(workload: Workload) -> Task:
 
 def _batch(workload: Workload) -> Task:
     robot, axes = _solver(workload)
-    poses = list(axes.without_tool_rotation(workload.T))  # the call would convert an array into a list
+    poses = list(
+        axes.without_tool_rotation(workload.T)
+    )  # the call would convert an array into a list
 
     def prepare(items: int) -> Call:
         chosen = poses[:items]
         return lambda: robot.IK_batched(chosen, num_worker_threads=workload.threads)
 
-    return Task(prepare, lambda k: [_solutions(result) for result in robot.IK_batched(poses[:k], workload.threads)])
+    return Task(
+        prepare,
+        lambda k: [_solutions(result) for result in robot.IK_batched(poses[:k], workload.threads)],
+    )
 
 
 def _robot(workload: Workload) -> tuple[Any, JointAxes]:

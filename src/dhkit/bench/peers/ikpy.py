@@ -57,7 +57,10 @@ def _chain(arm: Arm) -> tuple[Any, Array]:
 def _path_to_tool(urdf: str) -> list[str]:
     """Return the names from the world to the tool: a link, a joint, a link and so on."""
     joints = ElementTree.fromstring(urdf).findall("joint")  # noqa: S314 - our own text
-    parents = {_link_name(joint, "child"): (_link_name(joint, "parent"), joint.get("name", "")) for joint in joints}
+    parents = {
+        _link_name(joint, "child"): (_link_name(joint, "parent"), joint.get("name", ""))
+        for joint in joints
+    }
     path = ["tool"]
     while path[0] in parents:
         path[:0] = parents[path[0]]

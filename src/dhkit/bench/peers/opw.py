@@ -40,13 +40,17 @@ def _batch_forward(workload: Workload) -> Task:
         chosen = np.ascontiguousarray(angles[:items])
         return lambda: robot.batch_forward(chosen)
 
-    return Task(prepare, lambda k: list(family.tool_poses(robot.batch_forward(angles[:k]).as_matrix())))
+    return Task(
+        prepare, lambda k: list(family.tool_poses(robot.batch_forward(angles[:k]).as_matrix()))
+    )
 
 
 def _inverse(workload: Workload) -> Task:
     robot, family, transform = _robot(workload)
     poses = [transform(T) for T in family.poses(workload.T[:10_000])]
-    return single_task(robot.inverse, poses, lambda solutions: family.ours(np.reshape(solutions, (-1, 6))))
+    return single_task(
+        robot.inverse, poses, lambda solutions: family.ours(np.reshape(solutions, (-1, 6)))
+    )
 
 
 def _reach(workload: Workload) -> Task:
@@ -68,5 +72,7 @@ def _robot(workload: Workload) -> tuple[Any, OrthoParallel, Any]:
     """Return the package's robot, the arm's parameters, and the function that converts poses."""
     package = import_peer("py_opw_kinematics")
     family = OrthoParallel.of(workload.arm.description)
-    model = package.KinematicModel(a1=family.a1, a2=family.a2, b=family.b, c2=family.c2, c3=family.c3)
+    model = package.KinematicModel(
+        a1=family.a1, a2=family.a2, b=family.b, c2=family.c2, c3=family.c3
+    )
     return package.Robot(model, degrees=False), family, package.RigidTransform.from_matrix

@@ -24,11 +24,25 @@ def contenders() -> tuple[Contender, ...]:
         Contender(FORWARD, "fk", Mode.SINGLE, _forward),
         Contender(JACOBIANS, "jacobian", Mode.SINGLE, _joint_jacobians),
         Contender("pin.computeFrameJacobian", "jacobian", Mode.SINGLE, _frame_jacobian),
-        Contender("pin.rnea", "inverse_dynamics", Mode.SINGLE, _algorithm("rnea", "inverse_dynamics")),
-        Contender(RNEA_BATCH, "inverse_dynamics", Mode.BATCH, _in_parallel("rneaInParallel", "inverse_dynamics")),
+        Contender(
+            "pin.rnea", "inverse_dynamics", Mode.SINGLE, _algorithm("rnea", "inverse_dynamics")
+        ),
+        Contender(
+            RNEA_BATCH,
+            "inverse_dynamics",
+            Mode.BATCH,
+            _in_parallel("rneaInParallel", "inverse_dynamics"),
+        ),
         Contender(CRBA, "mass_matrix", Mode.SINGLE, _algorithm("crba", "mass_matrix")),
-        Contender("pin.aba", "forward_dynamics", Mode.SINGLE, _algorithm("aba", "forward_dynamics")),
-        Contender(ABA_BATCH, "forward_dynamics", Mode.BATCH, _in_parallel("abaInParallel", "forward_dynamics")),
+        Contender(
+            "pin.aba", "forward_dynamics", Mode.SINGLE, _algorithm("aba", "forward_dynamics")
+        ),
+        Contender(
+            ABA_BATCH,
+            "forward_dynamics",
+            Mode.BATCH,
+            _in_parallel("abaInParallel", "forward_dynamics"),
+        ),
     )
 
 
@@ -71,7 +85,12 @@ def _frame_jacobian(workload: Workload) -> Task:
 
         return loop
 
-    return Task(prepare, _answers(lambda q: np.reshape(compute(model, data, q, tool, axes), (6, model.nv)), workload))
+    return Task(
+        prepare,
+        _answers(
+            lambda q: np.reshape(compute(model, data, q, tool, axes), (6, model.nv)), workload
+        ),
+    )
 
 
 def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
@@ -149,5 +168,7 @@ def _loop(algorithm: Callable[..., object], model: Any, states: Array) -> Callab
     return prepare
 
 
-def _answers(answer: Callable[[Array], Array], workload: Workload) -> Callable[[int], Sequence[Array]]:
+def _answers(
+    answer: Callable[[Array], Array], workload: Workload
+) -> Callable[[int], Sequence[Array]]:
     return lambda k: [answer(q).copy() for q in workload.q[:k]]

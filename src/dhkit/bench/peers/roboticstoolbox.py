@@ -8,7 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError, Workload, import_peer, single_task
+from dhkit.bench.contenders import (
+    Call,
+    Contender,
+    Mode,
+    Task,
+    UnavailableError,
+    Workload,
+    import_peer,
+    single_task,
+)
 from dhkit.bench.geometry import has_spherical_wrist, joint_axes
 from dhkit.description import Array, Convention, Description
 
@@ -24,11 +33,21 @@ def contenders() -> tuple[Contender, ...]:
     """Return the toolbox's contenders."""
     setups: tuple[tuple[str, str, Mode, _Setup], ...] = (
         ("fkine", "fk", Mode.SINGLE, _single("fk", lambda robot: robot.fkine, lambda T: T.A)),
-        ("fkine (batch)", "fk", Mode.BATCH, _batch(lambda robot: robot.fkine, lambda poses: [T.A for T in poses])),
+        (
+            "fkine (batch)",
+            "fk",
+            Mode.BATCH,
+            _batch(lambda robot: robot.fkine, lambda poses: [T.A for T in poses]),
+        ),
         ("ets.eval", "fk", Mode.SINGLE, _single("fk", lambda robot: robot.ets().eval)),
         ("ets.eval (batch)", "fk", Mode.BATCH, _batch(lambda robot: robot.ets().eval, list)),
         ("jacob0", "jacobian", Mode.SINGLE, _single("jacobian", lambda robot: robot.jacob0)),
-        ("ets.jacob0", "jacobian", Mode.SINGLE, _single("jacobian", lambda robot: robot.ets().jacob0)),
+        (
+            "ets.jacob0",
+            "jacobian",
+            Mode.SINGLE,
+            _single("jacobian", lambda robot: robot.ets().jacob0),
+        ),
         ("ikine_a", "ik", Mode.SINGLE, _ikine_a),
         ("analytic_ik", "ik", Mode.SINGLE, _analytic_ik),
         (
@@ -37,15 +56,35 @@ def contenders() -> tuple[Contender, ...]:
             Mode.SINGLE,
             _single("ik", lambda robot: partial(robot.ets().ik_LM, **_IK_OPTIONS), _successful),
         ),
-        ("rne", "inverse_dynamics", Mode.SINGLE, _single("inverse_dynamics", lambda robot: robot.rne, np.ravel)),
-        ("inertia", "mass_matrix", Mode.SINGLE, _single("mass_matrix", lambda robot: robot.inertia)),
-        ("accel", "forward_dynamics", Mode.SINGLE, _single("forward_dynamics", lambda robot: robot.nofriction().accel)),
+        (
+            "rne",
+            "inverse_dynamics",
+            Mode.SINGLE,
+            _single("inverse_dynamics", lambda robot: robot.rne, np.ravel),
+        ),
+        (
+            "inertia",
+            "mass_matrix",
+            Mode.SINGLE,
+            _single("mass_matrix", lambda robot: robot.inertia),
+        ),
+        (
+            "accel",
+            "forward_dynamics",
+            Mode.SINGLE,
+            _single("forward_dynamics", lambda robot: robot.nofriction().accel),
+        ),
     )
-    return tuple(Contender(f"roboticstoolbox {name}", quantity, mode, setup) for name, quantity, mode, setup in setups)
+    return tuple(
+        Contender(f"roboticstoolbox {name}", quantity, mode, setup)
+        for name, quantity, mode, setup in setups
+    )
 
 
 def _single(
-    quantity: str, function_of: Callable[[Any], Callable[..., Any]], answer: Callable[[Any], Array] = lambda x: x
+    quantity: str,
+    function_of: Callable[[Any], Callable[..., Any]],
+    answer: Callable[[Any], Array] = lambda x: x,
 ) -> _Setup:
     """Return the setup of a function of the toolbox's robot that is called state by state."""
 
@@ -56,7 +95,9 @@ def _single(
     return setup
 
 
-def _batch(function_of: Callable[[Any], Callable[..., Any]], answers: Callable[[Any], list[Array]]) -> _Setup:
+def _batch(
+    function_of: Callable[[Any], Callable[..., Any]], answers: Callable[[Any], list[Array]]
+) -> _Setup:
     """Return the setup of a function of the toolbox's robot that is called once for all states."""
 
     def setup(workload: Workload) -> Task:
@@ -75,14 +116,20 @@ def _ikine_a(workload: Workload) -> Task:
     import_peer("roboticstoolbox")
     puma = import_peer("roboticstoolbox.models.DH").Puma560()
     states = workload.q[:3]
-    if workload.arm.n != 6 or any(np.abs(puma.fkine(q).A - workload.arm.fk(q)).max() > _SAME_ARM for q in states):
-        raise UnavailableError("written for the toolbox's own PUMA 560 only; this arm is another one")
+    if workload.arm.n != 6 or any(
+        np.abs(puma.fkine(q).A - workload.arm.fk(q)).max() > _SAME_ARM for q in states
+    ):
+        raise UnavailableError(
+            "written for the toolbox's own PUMA 560 only; this arm is another one"
+        )
     return single_task(puma.ikine_a, workload.T, _successful)
 
 
 def _analytic_ik(workload: Workload) -> Task:
     if not has_spherical_wrist(joint_axes(workload.arm.description)):
-        raise UnavailableError("derives its equations for minutes where there is no spherical wrist")
+        raise UnavailableError(
+            "derives its equations for minutes where there is no spherical wrist"
+        )
     import_peer("sympy")
     robot = toolbox_robot(workload.arm.description)
     if workload.arm.n != 6 or workload.arm.description.convention is not Convention.STANDARD:
@@ -119,7 +166,11 @@ def toolbox_robot(description: Description) -> Any:
         shared: dict[str, Any] = {"a": float(numbers.a[i]), "alpha": float(numbers.alpha[i])}
         if np.isfinite(numbers.mass[i]):
             # The reflected inertia counts alone: it becomes a rotor with a gear of ratio 1.
-            shared |= {"m": float(numbers.mass[i]), "r": numbers.com[i], "I": np.array(numbers.inertia[i])}
+            shared |= {
+                "m": float(numbers.mass[i]),
+                "r": numbers.com[i],
+                "I": np.array(numbers.inertia[i]),
+            }
             shared |= {"Jm": float(numbers.armature[i]), "G": 1.0, "B": 0.0, "Tc": [0.0, 0.0]}
         d = float(numbers.d[i])
         theta = float(numbers.theta[i])
@@ -127,5 +178,9 @@ def toolbox_robot(description: Description) -> Any:
             links.append(prismatic(theta=theta, offset=d, **shared))
         else:
             links.append(revolute(d=d, offset=theta, **shared))
-    base, tool = (SE3(np.array(T), check=False) for T in (numbers.T_world_base, numbers.T_last_tool))
-    return toolbox.DHRobot(links, name=description.name, base=base, tool=tool, gravity=np.array(numbers.gravity))
+    base, tool = (
+        SE3(np.array(T), check=False) for T in (numbers.T_world_base, numbers.T_last_tool)
+    )
+    return toolbox.DHRobot(
+        links, name=description.name, base=base, tool=tool, gravity=np.array(numbers.gravity)
+    )

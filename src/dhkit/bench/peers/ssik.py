@@ -13,7 +13,15 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.bench.contenders import Contender, Mode, Task, UnavailableError, Workload, import_peer, single_task
+from dhkit.bench.contenders import (
+    Contender,
+    Mode,
+    Task,
+    UnavailableError,
+    Workload,
+    import_peer,
+    single_task,
+)
 from dhkit.bench.geometry import JointAxes, bare, joint_axes
 
 _MAX_BUILD_TIME = 120.0
@@ -38,7 +46,9 @@ def _solve(workload: Workload) -> Task:
     _package_and_axes(workload)
     # Without limits, one solution for each branch, as the other packages return.
     solve = partial(_build_module(workload).solve, respect_limits=False)
-    return single_task(solve, workload.T, lambda found: np.reshape([x.q for x in found], (-1, workload.arm.n)))
+    return single_task(
+        solve, workload.T, lambda found: np.reshape([x.q for x in found], (-1, workload.arm.n))
+    )
 
 
 def _package_and_axes(workload: Workload) -> tuple[Any, JointAxes]:
@@ -56,9 +66,21 @@ def _build_module(workload: Workload) -> Any:
         module = Path(folder) / "arm_ik.py"
         urdf.write_text(Arm(bare(workload.arm.description)).urdf(), encoding="utf-8")
         ends = ("--base", "world", "--ee", "tool")
-        command = [sys.executable, "-m", "ssik.cli", "build", str(urdf), *ends, "--out", str(module), "--no-validate"]
+        command = [
+            sys.executable,
+            "-m",
+            "ssik.cli",
+            "build",
+            str(urdf),
+            *ends,
+            "--out",
+            str(module),
+            "--no-validate",
+        ]
         try:
-            process = subprocess.run(command, capture_output=True, text=True, timeout=_MAX_BUILD_TIME, check=False)  # noqa: S603
+            process = subprocess.run(  # noqa: S603
+                command, capture_output=True, text=True, timeout=_MAX_BUILD_TIME, check=False
+            )
         except subprocess.TimeoutExpired:
             raise UnavailableError(f"`ssik build` took more than {_MAX_BUILD_TIME:.0f} s") from None
         if process.returncode or not module.exists():

@@ -51,14 +51,20 @@ def lagranges_equations(description: Description) -> Any:
             end.set_pos(point, a * frame.x + d * moved.z)
         end.set_vel(world, end.pos_from(origin).dt(world))
         com = mechanics.Point(f"C{i + 1}")
-        lever = sum((exact(x) * axis for x, axis in zip(numbers.com[i], moved, strict=True)), 0 * moved.x)
+        lever = sum(
+            (exact(x) * axis for x, axis in zip(numbers.com[i], moved, strict=True)), 0 * moved.x
+        )
         com.set_pos(end, lever)
         com.set_vel(world, com.pos_from(origin).dt(world))
         I = numbers.inertia[i]  # noqa: E741 - the field's letter
-        tensor = mechanics.inertia(moved, *(exact(x) for x in (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[1, 2], I[0, 2])))
+        tensor = mechanics.inertia(
+            moved, *(exact(x) for x in (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[1, 2], I[0, 2]))
+        )
         mass = exact(numbers.mass[i])
         body = mechanics.RigidBody(f"L{i + 1}", com, moved, mass, (tensor, com))
-        gravity = sum((exact(x) * axis for x, axis in zip(numbers.gravity, world, strict=True)), 0 * world.x)
+        gravity = sum(
+            (exact(x) * axis for x, axis in zip(numbers.gravity, world, strict=True)), 0 * world.x
+        )
         body.potential_energy = -mass * com.pos_from(origin).dot(gravity)
         bodies.append(body)
         frame = moved
@@ -72,4 +78,6 @@ def _angle(sympy: Any, number: float) -> Any:
     """Return an angle as the multiple of pi/12 that it is, or as its decimal."""
     twelfths = round(float(number) * 12 / float(sympy.pi))
     exact = sympy.pi * twelfths / 12
-    return exact if abs(float(exact) - float(number)) < 1e-15 else sympy.Rational(repr(float(number)))
+    return (
+        exact if abs(float(exact) - float(number)) < 1e-15 else sympy.Rational(repr(float(number)))
+    )

@@ -26,7 +26,12 @@ _CLOSING = frozenset(")]}")
 def is_mathematica(text: str) -> bool:
     r"""Whether a text is Mathematica's: a function with square brackets, a list in braces, \[Theta]."""
     without_names = re.sub(r"\\\[[A-Z][A-Za-z]*\]", "", text)
-    return "\\" not in without_names and "_{" not in text and "^{" not in text and bool(_MATHEMATICA.search(text))
+    return (
+        "\\" not in without_names
+        and "_{" not in text
+        and "^{" not in text
+        and bool(_MATHEMATICA.search(text))
+    )
 
 
 def from_mathematica(tokens: Sequence[Token], text: str) -> list[Token]:
@@ -40,7 +45,9 @@ def from_mathematica(tokens: Sequence[Token], text: str) -> list[Token]:
     tokens = replace_runs(tokens, partial(_letter, tokens))
     tokens = replace_runs(tokens, partial(_exponent, tokens))
     closing = _closing_places(tokens, text)
-    return _with_plain_brackets(replace_runs(tokens, lambda k: _name(tokens, k, closing, text)), text)
+    return _with_plain_brackets(
+        replace_runs(tokens, lambda k: _name(tokens, k, closing, text)), text
+    )
 
 
 def _letter(tokens: Sequence[Token], k: int) -> tuple[list[Token], int] | None:
@@ -49,7 +56,11 @@ def _letter(tokens: Sequence[Token], k: int) -> tuple[list[Token], int] | None:
         return None
     letter = tokens[k + 2].text.lower()
     end = k + 4
-    if end < len(tokens) and tokens[end].kind == "number" and tokens[end].at == tokens[end - 1].at + 1:
+    if (
+        end < len(tokens)
+        and tokens[end].kind == "number"
+        and tokens[end].at == tokens[end - 1].at + 1
+    ):
         letter += tokens[end].text
         end += 1
     return [Token("name", letter, tokens[end - 1].at)], end
@@ -63,11 +74,15 @@ def _exponent(tokens: Sequence[Token], k: int) -> tuple[list[Token], int] | None
     end = k + 4 + len(minus)
     exponent = tokens[end - 1].text if end <= len(tokens) else ""
     return (
-        ([Token("number", f"{tokens[k].text}e{minus}{exponent}", tokens[k].at)], end) if exponent.isdecimal() else None
+        ([Token("number", f"{tokens[k].text}e{minus}{exponent}", tokens[k].at)], end)
+        if exponent.isdecimal()
+        else None
     )
 
 
-def _name(tokens: Sequence[Token], k: int, closing: Mapping[int, int], text: str) -> tuple[list[Token], int] | None:
+def _name(
+    tokens: Sequence[Token], k: int, closing: Mapping[int, int], text: str
+) -> tuple[list[Token], int] | None:
     """Read a name that Mathematica has in another way: Pi, D[...], Derivative[...], Subscript[...], ArcTan[x, y]."""
     token = tokens[k]
     if token.kind != "name" or not begins_with(tokens, k + 1, "["):
@@ -111,12 +126,18 @@ def _closing_places(tokens: Sequence[Token], text: str) -> dict[int, int]:
 
 def _only_comma(tokens: Sequence[Token], start: int, end: int) -> int:
     """Return where the one comma of a bracket's own level is; 0 where there is none, or more than one."""
-    depths = accumulate((token.text in _OPENING) - (token.text in _CLOSING) for token in tokens[start + 1 : end])
-    commas = [k for k, depth in enumerate(depths, start + 1) if depth == 0 and tokens[k].text == ","]
+    depths = accumulate(
+        (token.text in _OPENING) - (token.text in _CLOSING) for token in tokens[start + 1 : end]
+    )
+    commas = [
+        k for k, depth in enumerate(depths, start + 1) if depth == 0 and tokens[k].text == ","
+    ]
     return commas[0] if len(commas) == 1 else 0
 
 
-def _derivative(tokens: Sequence[Token], k: int, closing: Mapping[int, int], text: str) -> tuple[list[Token], int]:
+def _derivative(
+    tokens: Sequence[Token], k: int, closing: Mapping[int, int], text: str
+) -> tuple[list[Token], int]:
     """Read Derivative[1][q1][t]."""
     order = tokens[k + 2].text
     second = closing[k + 1] + 1
@@ -125,7 +146,9 @@ def _derivative(tokens: Sequence[Token], k: int, closing: Mapping[int, int], tex
         fail(text, at, "a derivative other than by t")
     end = closing[second] + 1
     inner = tokens[second + 1 : end - 1]
-    return derivative_by_time(inner, int(order), at), end + 3 if begins_with(tokens, end, "[", "t", "]") else end
+    return derivative_by_time(inner, int(order), at), end + 3 if begins_with(
+        tokens, end, "[", "t", "]"
+    ) else end
 
 
 def _with_plain_brackets(tokens: list[Token], text: str) -> list[Token]:
@@ -133,7 +156,9 @@ def _with_plain_brackets(tokens: list[Token], text: str) -> list[Token]:
     result = list(tokens)
     for start, end in _closing_places(tokens, text).items():
         before = tokens[start - 1] if start else sign("", 0)
-        is_call = tokens[start].text == "[" and (before.kind in ("name", "function") or before.text == "'")
+        is_call = tokens[start].text == "[" and (
+            before.kind in ("name", "function") or before.text == "'"
+        )
         is_time = begins_with(tokens, start, "{", "t")
         pair = "()" if is_call or is_time or tokens[start].text == "(" else "[]"
         result[start] = sign(pair[0], tokens[start].at)

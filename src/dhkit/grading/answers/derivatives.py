@@ -41,7 +41,9 @@ def time_derivative(tree: Tree) -> Tree:
     if derivative is None:
         return number(0, 0)
     if node_count(derivative, BOUNDS.derivative_nodes) > BOUNDS.derivative_nodes:
-        raise AnswerError(f"a time derivative of more than {BOUNDS.derivative_nodes} terms and factors")
+        raise AnswerError(
+            f"a time derivative of more than {BOUNDS.derivative_nodes} terms and factors"
+        )
     return derivative
 
 
@@ -82,12 +84,16 @@ def _derivative_of_product(factors: tuple[tuple[bool, Tree], ...]) -> Tree | Non
 def _derivative_of_power(base: Tree, exponent: Tree, at: int) -> Tree | None:
     change = _derivative(base)
     if _derivative(exponent) is not None:
-        raise AnswerError(f"a time derivative of a power with a changing exponent at position {at + 1}")
+        raise AnswerError(
+            f"a time derivative of a power with a changing exponent at position {at + 1}"
+        )
     if change is None:
         return None
     if isinstance(exponent, Number) and exponent.value == 2:
         return product(exponent, base, change)
-    return product(exponent, Power(base, Sum(((True, exponent), (False, number(1, at)))), at), change)
+    return product(
+        exponent, Power(base, Sum(((True, exponent), (False, number(1, at)))), at), change
+    )
 
 
 def _derivative_of_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree | None:

@@ -37,7 +37,9 @@ LEFT_EMPTY = "left empty"
 _KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
 """Other names of the kinetic energy; T is a quantity of its own too."""
 
-_BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
+_BRACKETED = re.compile(
+    r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()"
+)
 """Beginning of a matrix in brackets, as the one entry of a quantity."""
 
 _SYSTEM = re.compile(
@@ -87,7 +89,10 @@ class Given:
 
 
 def vocabulary_of(
-    description: Description, sheet: AnswerSheet, sums: Sequence[Sequence[int]] = (), inverse: bool = False
+    description: Description,
+    sheet: AnswerSheet,
+    sums: Sequence[Sequence[int]] = (),
+    inverse: bool = False,
 ) -> Vocabulary:
     """Return the meanings of names on a sheet.
 
@@ -109,7 +114,9 @@ def vocabulary_of(
     """
     further = (*POSE_NAMES, *table_lengths(description)) if inverse else ()
     names = sheet.names
-    vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further)
+    vocabulary = Vocabulary(
+        description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further
+    )
     steps = [[*step.equations, *step.solutions] for step in sheet.steps]
     texts = _texts([sheet.answers, sheet.table, sheet.branches, steps, names.parameters])
     vocabulary.first_index = first_index(texts, vocabulary)
@@ -183,7 +190,10 @@ def given_quantity(
         value = _system(name, value, names)
     if isinstance(value, EqualFormulas):
         return _chained(
-            [given_quantity(name, formula, shape, vocabulary, names, matrix_of) for formula in value.formulas]
+            [
+                given_quantity(name, formula, shape, vocabulary, names, matrix_of)
+                for formula in value.formulas
+            ]
         )
     places = list(np.ndindex(shape))
     entries: Iterable[tuple[tuple[int, ...], Answer]]
@@ -191,7 +201,9 @@ def given_quantity(
         for index in value.texts:
             if index not in places:
                 size = " x ".join(map(str, shape))
-                raise AnswerError(f"{name}: found {Target(name, index)}; expected {size} entries, counted from 1")
+                raise AnswerError(
+                    f"{name}: found {Target(name, index)}; expected {size} entries, counted from 1"
+                )
         entries = [(index, value.texts.get(index, "")) for index in places]
     elif isinstance(value, str) and shape and (len(places) != 1 or _BRACKETED.match(value)):
         given = _from_one_text(name, _without_head(name, value), shape, vocabulary, matrix_of)
@@ -217,7 +229,9 @@ def with_entries_gathered(answers: Mapping[str, Answer], names: QuantityNames) -
     for name, value in answers.items():
         targets = [] if names.quantity(name) else names.entries(name)
         if len(targets) > 1:
-            raise AnswerError(f"{name}: may be {' or '.join(map(str, targets))}; write M_1_12 or M_11_2")
+            raise AnswerError(
+                f"{name}: may be {' or '.join(map(str, targets))}; write M_1_12 or M_11_2"
+            )
         if not targets or targets[0].index is None:
             gathered[name] = value
             continue
@@ -258,7 +272,9 @@ def _system(name: str, text: str, names: QuantityNames) -> str | EqualFormulas |
 
 
 def _formulas(statement: Statement) -> str | EqualFormulas:
-    return statement.formulas[0] if len(statement.formulas) == 1 else EqualFormulas(statement.formulas)
+    return (
+        statement.formulas[0] if len(statement.formulas) == 1 else EqualFormulas(statement.formulas)
+    )
 
 
 def _without_name(target: Target, text: str, names: QuantityNames) -> str | EqualFormulas:
@@ -279,10 +295,14 @@ def _without_name(target: Target, text: str, names: QuantityNames) -> str | Equa
     if not statement.formulas:
         return text
     if not statement.targets:
-        raise AnswerError(f"{quote(text)}: begins with {quote(statement.formulas[0])}, which is not a name of {target}")
+        raise AnswerError(
+            f"{quote(text)}: begins with {quote(statement.formulas[0])}, which is not a name of {target}"
+        )
     for name in statement.targets:
         if not _may_stand_for(name, target, names):
-            raise AnswerError(f"{quote(text)}: states {name}, and stands where {target} is expected")
+            raise AnswerError(
+                f"{quote(text)}: states {name}, and stands where {target} is expected"
+            )
     return _formulas(statement)
 
 
@@ -294,7 +314,9 @@ def _may_stand_for(name: str, target: Target, names: QuantityNames) -> bool:
     if target in entries or names.quantity(name) == target.quantity:
         return True
     letters = name.rstrip("0123456789_")
-    is_taken = bool(entries or names.quantity(name) or names.quantity(letters)) or names.is_parameter(name)
+    is_taken = bool(
+        entries or names.quantity(name) or names.quantity(letters)
+    ) or names.is_parameter(name)
     return not (is_taken or names.vocabulary.knows(name))
 
 
@@ -302,7 +324,11 @@ def _without_head(name: str, text: str) -> str:
     """Take M = and M(q) = away from in front of M."""
     head, equals, rest = text.partition("=")
     own = plain_name(re.sub(r"\(.*", "", head.strip(), flags=re.DOTALL))
-    return rest.rstrip().removesuffix(";") if equals and own == name and not rest.startswith("=") else text
+    return (
+        rest.rstrip().removesuffix(";")
+        if equals and own == name and not rest.startswith("=")
+        else text
+    )
 
 
 # Entries
@@ -348,7 +374,9 @@ def _mirrored(given: Sequence[Given]) -> tuple[Given, ...]:
     return tuple(mirrored)
 
 
-def given_rows(rows: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary) -> list[tuple[Given, ...]]:
+def given_rows(
+    rows: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary
+) -> list[tuple[Given, ...]]:
     """Return the entries of a table of n rows, each with four entries.
 
     Raises
@@ -361,7 +389,9 @@ def given_rows(rows: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary) ->
     return _given_lists(rows, vocabulary)
 
 
-def given_branches(branches: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary) -> list[tuple[Given, ...]]:
+def given_branches(
+    branches: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary
+) -> list[tuple[Given, ...]]:
     """Return the formulas of inverse kinematics, n for each branch.
 
     Raises
@@ -371,7 +401,9 @@ def given_branches(branches: Sequence[Sequence[str]], n: int, vocabulary: Vocabu
     """
     for k, branch in enumerate(branches, start=1):
         if len(branch) != n:
-            raise AnswerError(f"ik: branch {k}: found {len(branch)} formulas; expected {n}, one a joint")
+            raise AnswerError(
+                f"ik: branch {k}: found {len(branch)} formulas; expected {n}, one a joint"
+            )
     named_branches = []
     for branch in branches:
         named = [with_pose_entries(text, vocabulary) for text in branch]
@@ -391,7 +423,9 @@ def _read(index: tuple[int, ...], value: Answer, vocabulary: Vocabulary) -> Give
     if isinstance(value, str) and not value.strip():
         return Given(index, "", error=LEFT_EMPTY)
     try:
-        if isinstance(value, str) and not is_pretty(value):  # in which the spaces of the first line count
+        if isinstance(value, str) and not is_pretty(
+            value
+        ):  # in which the spaces of the first line count
             value = value.strip().rstrip(";,")
         return Given(index, *entry_tree(value, vocabulary))
     except AnswerError as error:
@@ -445,5 +479,7 @@ def _from_one_text(
     entries = list(chain.from_iterable(rows))
     if len(entries) != len(places):
         expected = f"expected {len(places)} entries" if shape else "expected a number"
-        raise AnswerError(f"{name}: {found if not shape else f'found {len(entries)} entries'}; {expected}")
+        raise AnswerError(
+            f"{name}: {found if not shape else f'found {len(entries)} entries'}; {expected}"
+        )
     return tuple(Given(place, *entry) for place, entry in zip(places, entries, strict=True))

@@ -72,22 +72,34 @@ def _readings(name: str, index: int, vocabulary: Vocabulary) -> tuple[str, str]:
     """Return the names that an index makes, counted from 0 and from 1; empty where it makes none."""
     from_zero = f"{plain_name(name)}{index + 1}"
     from_one = f"{plain_name(name)}{index}"
-    return from_zero if vocabulary.knows(from_zero) else "", from_one if vocabulary.knows(from_one) else ""
+    return from_zero if vocabulary.knows(from_zero) else "", from_one if vocabulary.knows(
+        from_one
+    ) else ""
 
 
 def _in_round_brackets(name: Token, index: int, vocabulary: Vocabulary, text: str) -> str:
     whole = plain_name(name.text) + str(index)
     is_only_joint = len(vocabulary.kinds) == 1 and vocabulary.is_state(name.text)
-    is_known = not is_only_joint and (vocabulary.is_exactly(name.text) or name.text in FUNCTION_NAMES)
-    if is_known and (vocabulary.is_state(whole) or (name.text in ("c", "s") and vocabulary.knows(whole))):
+    is_known = not is_only_joint and (
+        vocabulary.is_exactly(name.text) or name.text in FUNCTION_NAMES
+    )
+    if is_known and (
+        vocabulary.is_state(whole) or (name.text in ("c", "s") and vocabulary.knows(whole))
+    ):
         problem = f"{name.text}({index}) may be {whole}, or {name.text} and a number in brackets; write which"
         fail(text, name.at, problem)
     return whole if not is_known and vocabulary.knows(whole) else ""
 
 
-def _in_square_brackets(name: Token, index: int, first: int | None, vocabulary: Vocabulary, text: str) -> str:
+def _in_square_brackets(
+    name: Token, index: int, first: int | None, vocabulary: Vocabulary, text: str
+) -> str:
     both = _readings(name.text, index, vocabulary)
     if first is None and all(both):
-        fail(text, name.at, f"{name.text}[{index}] may be {both[1]} or, counted from 0, {both[0]}; write one of them")
+        fail(
+            text,
+            name.at,
+            f"{name.text}[{index}] may be {both[1]} or, counted from 0, {both[0]}; write one of them",
+        )
     whole = both[first] if first is not None else both[0] or both[1]
     return whole or fail(text, name.at, f"unknown name {name.text}[{index}]")

@@ -10,7 +10,13 @@ from itertools import pairwise
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.expressions.trees import equal_parts, names_of, operands, replaced_everywhere, with_operands
+from dhkit.expressions.trees import (
+    equal_parts,
+    names_of,
+    operands,
+    replaced_everywhere,
+    with_operands,
+)
 from dhkit.grading.answers.pose_entries import with_pose_entries
 from dhkit.grading.answers.reading import answer_tokens, meaning_of, read_answer
 from dhkit.grading.answers.sheet_values import InverseStep
@@ -36,7 +42,9 @@ _TURNED_BACK = re.compile(
     re.DOTALL,
 )
 """A formula whose whole turns are taken off, which changes nothing."""
-_SQUARE_OF_NAME = re.compile(r"^\s*(\\?[A-Za-z]\w*)\s*(?:\^|\*\*)\s*(?:2|\{2\}|\(2\))\s*$", re.ASCII)
+_SQUARE_OF_NAME = re.compile(
+    r"^\s*(\\?[A-Za-z]\w*)\s*(?:\^|\*\*)\s*(?:2|\{2\}|\(2\))\s*$", re.ASCII
+)
 """The square of a name, on a side of its own: r^2 = px^2 + py^2 defines r."""
 _FUNCTION_OF_NAME = re.compile(r"^\s*\\?(cos|tan)\s*\(?\s*(\\?[A-Za-z]\w*)\s*\)?\s*$", re.ASCII)
 """A function of a name on a side of its own: cos(gamma) = ... and tan(beta) = y/x define angles."""
@@ -80,7 +88,9 @@ class GivenStep:
     def read_as(self) -> tuple[str, str]:
         """The step as it was read, in the robot's own names, as plain text and as LaTeX; empty if it is too long."""
         joint = Name(f"q{self.joint + 1}", 0)
-        return typeset_equations([*self.equations, *((joint, formula) for formula in self.solutions)])
+        return typeset_equations(
+            [*self.equations, *((joint, formula) for formula in self.solutions)]
+        )
 
 
 def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[GivenStep]:
@@ -92,14 +102,22 @@ def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[Gi
     given: list[GivenStep] = []
     defined: set[str] = set()
     for step in steps:
-        text = "; ".join([*step.equations, *(_titled(step.joint, formula) for formula in step.solutions)])
+        text = "; ".join(
+            [*step.equations, *(_titled(step.joint, formula) for formula in step.solutions)]
+        )
         reading = _Reading(step.joint, vocabulary, frozenset(defined))
         try:
             if step.joint - 1 in [other.joint for other in given if not other.error]:
-                raise AnswerError(f"joint {step.joint} has a step already; expected all of its formulas in one")
+                raise AnswerError(
+                    f"joint {step.joint} has a step already; expected all of its formulas in one"
+                )
             given.append(reading.step(step, text))
         except AnswerError as error:
-            hint = "; a quantity of your own is defined by an equation, D = ..." if "unknown name" in str(error) else ""
+            hint = (
+                "; a quantity of your own is defined by an equation, D = ..."
+                if "unknown name" in str(error)
+                else ""
+            )
             given.append(GivenStep(step.joint - 1, text, error=f"{error}{hint}"))
         reading.forget_signs()
         defined |= reading.defined
@@ -148,7 +166,9 @@ class _Reading:
         for formula in step.solutions:
             solutions += self._solutions(self._plain(formula))
         if not equations and not solutions:
-            raise AnswerError(f"{quote(text)}: defines quantities, and has no equation or solution of q{self.joint}")
+            raise AnswerError(
+                f"{quote(text)}: defines quantities, and has no equation or solution of q{self.joint}"
+            )
         return GivenStep(self.joint - 1, text, tuple(equations), tuple(solutions))
 
     def _plain(self, text: str) -> str:
@@ -160,7 +180,9 @@ class _Reading:
     def forget_signs(self) -> None:
         """Take the names with two signs back: which sign a later step means is not known."""
         for name in self.signed:
-            self.vocabulary.refuse(name, f"it has two signs; write the sine or cosine of q{self.joint} in its place")
+            self.vocabulary.refuse(
+                name, f"it has two signs; write the sine or cosine of q{self.joint} in its place"
+            )
 
     def _read(self, text: str, sign: str = "+") -> Tree:
         """Return the tree of a formula, with ± as a sign."""
@@ -181,7 +203,11 @@ class _Reading:
         own = f"q{self.joint}"
         for one, other in ((left, right), (right, left)):
             function = self._read(one)
-            if _EITHER_SIGN.search(one) or not isinstance(function, Call) or own not in names_of(function):
+            if (
+                _EITHER_SIGN.search(one)
+                or not isinstance(function, Call)
+                or own not in names_of(function)
+            ):
                 continue
             values = {sign: self._with_values(self._read(other, sign), sign) for sign in "+-"}
             if not any(own in names_of(value) for value in values.values()):
@@ -226,8 +252,13 @@ class _Reading:
             self._define(function[2], f"acos({right})")
         elif function and self._new_name(function[2]):
             numerator, slash, denominator = right.partition("/")
-            is_quotient = slash and "/" not in denominator and not any(map(nesting, numerator + denominator))
-            self._define(function[2], f"atan2({numerator}, {denominator})" if is_quotient else f"atan({right})")
+            is_quotient = (
+                slash and "/" not in denominator and not any(map(nesting, numerator + denominator))
+            )
+            self._define(
+                function[2],
+                f"atan2({numerator}, {denominator})" if is_quotient else f"atan({right})",
+            )
         else:
             return False
         return True
@@ -277,7 +308,9 @@ class _Reading:
         if len(sides) == 1 and _EQUALS.search(text):
             return []
         if len(sides) < 2 or not all(side.strip() for side in sides):
-            raise AnswerError(f"{quote(text)}: no equals sign between two sides; expected an equation")
+            raise AnswerError(
+                f"{quote(text)}: no equals sign between two sides; expected an equation"
+            )
         return list(pairwise(sides))
 
     def _is_solution(self, left: str, right: str) -> bool:
@@ -298,7 +331,9 @@ class _Reading:
         if plus[0] == minus[0] and (square := _square_of_both(plus[1], minus[1])):
             return Power(plus[0], Number(Fraction(2), "2", 0), 0), square
         differences = [Sum(((True, left), (False, right))) for left, right in (plus, minus)]
-        return Product(tuple((True, difference) for difference in differences)), Number(Fraction(0), "0", 0)
+        return Product(tuple((True, difference) for difference in differences)), Number(
+            Fraction(0), "0", 0
+        )
 
     def _both_signs(self, text: str) -> list[Tree]:
         """Return a formula, or two where it has the sign ±: first with +, then with -."""
@@ -317,7 +352,9 @@ class _Reading:
         sides = _EQUALS.split(formula)
         for head in sides[:-1]:
             if self._new_name(head) or not _is_name(self._read(head), f"q{self.joint}"):
-                raise AnswerError(f"{quote(head.strip())} stands in front of a solution of q{self.joint}")
+                raise AnswerError(
+                    f"{quote(head.strip())} stands in front of a solution of q{self.joint}"
+                )
         return self._both_signs(sides[-1])
 
 

@@ -19,7 +19,9 @@ from dhkit.grading.answers.tokens import (
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
-_PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
+_PIECE = re.compile(
+    r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL
+)
 _MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
 """A number in front of a fraction, which is not a subscript or exponent."""
 SPACE_NAMES = word_set(
@@ -224,7 +226,11 @@ class _LatexReader:
         at = self.at
         if careless := re.compile(r"_(\d)(\d+)", re.ASCII).match(self.text, at):
             first, rest = careless.groups()
-            fail(self.text, at, f"{careless[0]} is _{first} followed by {rest} in LaTeX; write _{{{first}{rest}}}")
+            fail(
+                self.text,
+                at,
+                f"{careless[0]} is _{first} followed by {rest} in LaTeX; write _{{{first}{rest}}}",
+            )
         self.at = self.text.index("_", at) + 1
         inner = self._argument(at)
         word = "".join({"+": "p", "-": "m", ",": ""}.get(token.text, token.text) for token in inner)
@@ -238,7 +244,9 @@ class _LatexReader:
         if name in _SPACES:
             return []
         if name in ("\\", "cr"):
-            spacing = re.compile(r"\s*\[-?\d*\.?\d+(?:pt|em|ex|mm|cm)\]", re.ASCII).match(self.text, self.at)
+            spacing = re.compile(r"\s*\[-?\d*\.?\d+(?:pt|em|ex|mm|cm)\]", re.ASCII).match(
+                self.text, self.at
+            )
             self.at = spacing.end() if spacing else self.at
             return [sign("\\\\", at)]
         if name == "partial":
@@ -280,7 +288,9 @@ class _LatexReader:
                 above = above[1:-1]
             return self._derivative(above, order, at)
         number = _MIXED.search(self.text[:at])
-        if number and [token.kind for token in above[1:-1]] == ["number"] == [token.kind for token in below[1:-1]]:
+        if number and [token.kind for token in above[1:-1]] == ["number"] == [
+            token.kind for token in below[1:-1]
+        ]:
             part = f"{above[1].text}/{below[1].text}"
             both = f"{number[1]} + {part} or {number[1]}*{part}"
             fail(self.text, at, f"{number[1]} {part} may be {both}; write one of them")
@@ -305,7 +315,11 @@ class _LatexReader:
         elif len(tokens) != 1 or tokens[0].kind != "name":
             tokens = []
         if not tokens or not _OPERAND_ENDS.match(self.text, self.at):
-            fail(self.text, at, "a derivative that may reach further than the name after it; put brackets around what")
+            fail(
+                self.text,
+                at,
+                "a derivative that may reach further than the name after it; put brackets around what",
+            )
         return tokens
 
     def _one_item(self) -> list[Token]:
@@ -320,8 +334,16 @@ class _LatexReader:
         tokens: list[Token] = []
         while item := self._one_item():
             tokens += item
-            brackets = [k for k, token in enumerate(tokens) if token.text == "(" and tokens[max(k - 1, 0)].text != "^"]
-            if closing_bracket(tokens, brackets[0]) == len(tokens) - 1 if brackets else tokens[-1].kind == "name":
+            brackets = [
+                k
+                for k, token in enumerate(tokens)
+                if token.text == "(" and tokens[max(k - 1, 0)].text != "^"
+            ]
+            if (
+                closing_bracket(tokens, brackets[0]) == len(tokens) - 1
+                if brackets
+                else tokens[-1].kind == "name"
+            ):
                 break
         return tokens
 
@@ -371,6 +393,12 @@ def _without_d(above: list[Token], order: int) -> list[Token] | None:
     if texts[: 1 + len(power)] == ["d", *power]:
         return above[1 + len(power) :]
     first = above[0] if above else None
-    if first is not None and order == 1 and first.kind == "name" and len(first.text) > 1 and first.text[0] == "d":
+    if (
+        first is not None
+        and order == 1
+        and first.kind == "name"
+        and len(first.text) > 1
+        and first.text[0] == "d"
+    ):
         return [Token("name", first.text[1:], first.at), *above[1:]]
     return None

@@ -30,10 +30,20 @@ from dhkit.grading.answers.tokens import (
 )
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary
 
-_MATRIX_WORDS = word_set("sym Matrix array matrix simplify transpose MutableDenseMatrix ImmutableMatrix DM SX")
+_MATRIX_WORDS = word_set(
+    "sym Matrix array matrix simplify transpose MutableDenseMatrix ImmutableMatrix DM SX"
+)
 """Functions that give a matrix of the one in their brackets."""
 
-TRANSPOSES = (["'"], [".'"], [".", "T"], ["^", "T"], ["^", "top"], ["^", "(", "T", ")"], ["^", "(", "top", ")"])
+TRANSPOSES = (
+    ["'"],
+    [".'"],
+    [".", "T"],
+    ["^", "T"],
+    ["^", "top"],
+    ["^", "(", "T", ")"],
+    ["^", "(", "top", ")"],
+)
 """Signs of a transpose, in tokens."""
 
 _COLUMN_SIGNS = (",", "&")
@@ -71,7 +81,9 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     start = next((k for k, token in enumerate(tokens) if token.text == "["), len(tokens))
     end = max((k for k, token in enumerate(tokens) if token.text == "]"), default=-1)
     if end < start:
-        hint = "; a matrix that it names is not on the sheet" if re.search(r"[A-Za-z]", text) else ""
+        hint = (
+            "; a matrix that it names is not on the sheet" if re.search(r"[A-Za-z]", text) else ""
+        )
         raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}{hint}")
     factors = _factors(tokens[:start], tokens[end + 1 :], text)
     entry_count = sum(token.text in (*_COLUMN_SIGNS, *_ROW_SIGNS) for token in tokens)
@@ -167,7 +179,11 @@ def _unwrap(tokens: list[Token], text: str) -> list[Token]:
     k = 0
     while k < len(tokens):
         token = tokens[k]
-        if token.kind != "name" or token.text not in _MATRIX_WORDS or not begins_with(tokens, k + 1, "("):
+        if (
+            token.kind != "name"
+            or token.text not in _MATRIX_WORDS
+            or not begins_with(tokens, k + 1, "(")
+        ):
             result.append(token)
             k += 1
             continue
@@ -176,11 +192,19 @@ def _unwrap(tokens: list[Token], text: str) -> list[Token]:
             del result[-2:]
         inner = _unwrap(tokens[k + 2 : end], text)
         pieces = _split(inner, (",",), text)
-        if len(pieces) == 3 and all(len(size) == 1 and size[0].text.isdecimal() for size in pieces[:2]):
-            inner = _reshape(int(pieces[0][0].text[:4]), int(pieces[1][0].text[:4]), pieces[2], text)
+        if len(pieces) == 3 and all(
+            len(size) == 1 and size[0].text.isdecimal() for size in pieces[:2]
+        ):
+            inner = _reshape(
+                int(pieces[0][0].text[:4]), int(pieces[1][0].text[:4]), pieces[2], text
+            )
         elif len(pieces) > 1 and all(piece and piece[0].text == "[" for piece in pieces):
             inner = [sign("[", token.at), *inner, sign("]", tokens[end - 1].at)]
-        result += [sign("(", tokens[k + 1].at), *inner, sign(")", tokens[min(end, len(tokens) - 1)].at)]
+        result += [
+            sign("(", tokens[k + 1].at),
+            *inner,
+            sign(")", tokens[min(end, len(tokens) - 1)].at),
+        ]
         result += [sign("'", token.at)] if token.text == "transpose" else []
         k = end + 1
     return result
@@ -190,7 +214,9 @@ def _reshape(rows: int, columns: int, entries: Sequence[Token], text: str) -> li
     """Return sympy's Matrix(2, 2, [a, b, c, d]) in rows."""
     pieces = _split(entries[1:-1], (",",), text) if entries and entries[0].text == "[" else []
     if len(pieces) != rows * columns:
-        raise AnswerError(f"{quote(text)}: {len(pieces)} entries in a matrix of {rows} times {columns}")
+        raise AnswerError(
+            f"{quote(text)}: {len(pieces)} entries in a matrix of {rows} times {columns}"
+        )
     at = entries[0].at
     matrix: list[Token] = []
     for k, piece in enumerate(pieces):
@@ -221,7 +247,13 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
             matrix.append(sign(separator, at))
             matrix += entry if j == i else zero
     is_of_module = k > 1 and tokens[k - 1].text == "." and tokens[k - 2].kind == "name"
-    return [*tokens[: k - 2 * is_of_module], sign("[", at), *matrix[1:], sign("]", at), *tokens[end + 1 :]]
+    return [
+        *tokens[: k - 2 * is_of_module],
+        sign("[", at),
+        *matrix[1:],
+        sign("]", at),
+        *tokens[end + 1 :],
+    ]
 
 
 class _Factors(NamedTuple):
@@ -258,7 +290,11 @@ def _factors(before: list[Token], after: list[Token], text: str) -> _Factors:
             break
     before = before[:end]
     after = after[start:]
-    if after and after[0].kind == "sign" and after[0].text not in ("*", "/", "+", "-", "(", ".*", "./", "\\,"):
+    if (
+        after
+        and after[0].kind == "sign"
+        and after[0].text not in ("*", "/", "+", "-", "(", ".*", "./", "\\,")
+    ):
         fail(text, after[0].at, f"{after[0].text!r} after a matrix, which is not read,")
     if before and before[-1].text in ("^", "/", ".", "./"):
         fail(text, before[-1].at, f"{before[-1].text!r} before a matrix, which is not read,")
@@ -266,7 +302,11 @@ def _factors(before: list[Token], after: list[Token], text: str) -> _Factors:
         depths = accumulate(nesting(token.text) for token in tokens)
         for token, depth in zip(tokens, depths, strict=True):
             if depth == 0 and token.kind == "sign" and token.text in ("+", "-"):
-                fail(text, token.at, "a matrix in a sum with a number (write it into the entries that have it)")
+                fail(
+                    text,
+                    token.at,
+                    "a matrix in a sum with a number (write it into the entries that have it)",
+                )
     return _Factors(before, after, is_transposed)
 
 
@@ -292,7 +332,11 @@ def _rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
         rows = [_strip(row) for row in _split(inner, (",", ";"), text)]
         for row in rows:
             if not row or row[0].text != "[" or closing_bracket(row, 0) != len(row) - 1:
-                fail(text, row[0].at if row else inner[-1].at, "a row that is not in brackets, beside rows that are,")
+                fail(
+                    text,
+                    row[0].at if row else inner[-1].at,
+                    "a row that is not in brackets, beside rows that are,",
+                )
         return [_split(row[1:-1], _COLUMN_SIGNS, text) for row in rows]
     may_have_spaces = not is_latex(text) and not is_mathematica(text)
     rows_of_entries = []

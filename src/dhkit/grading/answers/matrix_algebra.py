@@ -63,7 +63,9 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
             continue
         outermost += 1
         k = closing_bracket(tokens, k) + 1
-        is_power |= begins_with(tokens, k, "^") and k + 1 < len(tokens) and tokens[k + 1].kind == "number"
+        is_power |= (
+            begins_with(tokens, k, "^") and k + 1 < len(tokens) and tokens[k + 1].kind == "number"
+        )
     return outermost > 1 or is_power
 
 
@@ -72,7 +74,9 @@ def _begins_matrix(tokens: Sequence[Token], k: int, text: str) -> bool:
     if tokens[k].text != "[":
         return False
     before = tokens[k - 1] if k else None
-    is_behind_operand = before is not None and (before.kind == "name" or before.text in ("'", ")", "]"))
+    is_behind_operand = before is not None and (
+        before.kind == "name" or before.text in ("'", ")", "]")
+    )
     return not is_behind_operand or is_latex(text)
 
 
@@ -90,7 +94,9 @@ def _end_of_arguments(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> i
         return k + 1
     end = closing_bracket(tokens, k + 1)
     arguments = tokens[k + 2 : end]
-    are_vectors = all(x.text == "," or (x.kind == "name" and matrix_of(x.text) is not None) for x in arguments)
+    are_vectors = all(
+        x.text == "," or (x.kind == "name" and matrix_of(x.text) is not None) for x in arguments
+    )
     return end + 1 if arguments and are_vectors else k + 1
 
 
@@ -134,7 +140,9 @@ class _MatrixReader:
         if len(terms) == 1 and terms[0][0]:
             return terms[0][1]
         if not any(isinstance(value, list) for _, value in terms):
-            return Sum(tuple((added, value) for added, value in terms if not isinstance(value, list)))
+            return Sum(
+                tuple((added, value) for added, value in terms if not isinstance(value, list))
+            )
         matrices = [(added, _as_matrix(value)) for added, value in terms]
         sizes = {_size(rows) for _, rows in matrices}
         if len(sizes) > 1 and _are_vectors(sizes):
@@ -165,7 +173,9 @@ class _MatrixReader:
             is_sign = depth == 0 and token.kind == "sign" and token.text in "+-"
             if is_sign and not term:
                 terms[-1] = added == (token.text == "+"), term
-            elif is_sign and not (term[-1].kind == "sign" and term[-1].text in (*_TIMES, *_OVER, "^")):
+            elif is_sign and not (
+                term[-1].kind == "sign" and term[-1].text in (*_TIMES, *_OVER, "^")
+            ):
                 terms.append((token.text == "+", []))
             else:
                 term.append(token)
@@ -216,7 +226,10 @@ class _MatrixReader:
 
     def _contains_matrix(self, tokens: Sequence[Token]) -> bool:
         places = range(len(tokens))
-        return any(_begins_matrix(tokens, k, self.text) or _is_named_matrix(tokens, k, self.matrix_of) for k in places)
+        return any(
+            _begins_matrix(tokens, k, self.text) or _is_named_matrix(tokens, k, self.matrix_of)
+            for k in places
+        )
 
     def _entry(self, entry: Sequence[Token], first: Token) -> Tree:
         if not entry:
@@ -226,26 +239,42 @@ class _MatrixReader:
     def _with_postfix(self, value: _Value, tokens: Sequence[Token], k: int) -> tuple[_Value, int]:
         """Return a factor with the transposes and powers after it, and where they end."""
         before = tokens[k - 1]
-        if begins_with(tokens, k, "'") and before.kind == "name" and self.vocabulary.is_position(f"{before.text}1"):
+        if (
+            begins_with(tokens, k, "'")
+            and before.kind == "name"
+            and self.vocabulary.is_position(f"{before.text}1")
+        ):
             name = before.text
             fail(
-                self.text, before.at, f"{name}' may be the transpose of {name} or its rate; write transpose({name}): it"
+                self.text,
+                before.at,
+                f"{name}' may be the transpose of {name} or its rate; write transpose({name}): it",
             )
         while k < len(tokens):
-            transpose = next((texts for texts in TRANSPOSES if begins_with(tokens, k, *texts)), None)
+            transpose = next(
+                (texts for texts in TRANSPOSES if begins_with(tokens, k, *texts)), None
+            )
             if transpose is not None and isinstance(value, list):
                 value = [list(column) for column in zip(*value, strict=True)]
                 k += len(transpose)
             elif tokens[k].text == "^":
                 power = tokens[k + 1] if k + 1 < len(tokens) else tokens[k]
                 if self._is_entrywise(tokens[k]):
-                    fail(self.text, tokens[k].at, "'.^' raises entry by entry; write ^ for the power of the matrix: it")
+                    fail(
+                        self.text,
+                        tokens[k].at,
+                        "'.^' raises entry by entry; write ^ for the power of the matrix: it",
+                    )
                 if (
                     power.kind != "number"
                     or not power.text.isdecimal()
                     or not 1 <= int(power.text[:3]) <= BOUNDS.matrix_power
                 ):
-                    fail(self.text, tokens[k].at, "a power of a matrix that is not a small whole number")
+                    fail(
+                        self.text,
+                        tokens[k].at,
+                        "a power of a matrix that is not a small whole number",
+                    )
                 base = value
                 result = value
                 for _ in range(int(power.text) - 1):
@@ -262,7 +291,11 @@ class _MatrixReader:
             return
         is_of_numpy = [token.text for token in signs] == ["*"] and _NUMPY.search(self.text)
         if is_of_numpy or (len(signs) == 1 and self._is_entrywise(signs[0])):
-            fail(self.text, signs[0].at, f"{signs[0].text!r} multiplies entry by entry; write @ for the product: it")
+            fail(
+                self.text,
+                signs[0].at,
+                f"{signs[0].text!r} multiplies entry by entry; write @ for the product: it",
+            )
 
     def _is_entrywise(self, token: Token) -> bool:
         """Whether a sign was typed with MATLAB's dot: .* and .^ are those of entries."""
@@ -299,7 +332,9 @@ class _MatrixReader:
         if len(left[0]) != len(right):
             m, n = _size(left)
             p, q = _size(right)
-            raise AnswerError(f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}")
+            raise AnswerError(
+                f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}"
+            )
         self.chain += 1
         self.products += len(left) * len(right) * len(right[0])
         if self.chain > BOUNDS.matrix_products or self.products > BOUNDS.entry_products:

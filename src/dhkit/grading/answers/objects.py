@@ -58,9 +58,15 @@ def _entries(value: Any, n: int, names: frozenset[str]) -> Any:
         return _entries(value.tolist(), n, names)
     if isinstance(value, list | tuple):
         return [_entries(entry, n, names) for entry in value]
-    if isinstance(value, str | int | float | Fraction | np.number) or library == "sympy" or callable(value):
+    if (
+        isinstance(value, str | int | float | Fraction | np.number)
+        or library == "sympy"
+        or callable(value)
+    ):
         return value
-    raise AnswerError(f"found {type(value).__name__}; expected text, numbers, sympy, CasADi or a function")
+    raise AnswerError(
+        f"found {type(value).__name__}; expected text, numbers, sympy, CasADi or a function"
+    )
 
 
 def _library(value: object) -> str:
@@ -73,7 +79,9 @@ def is_entry(value: object) -> bool:
     """Whether :func:`entry_tree` reads a value."""
     if isinstance(value, _CasadiScalar) or _library(value) == "sympy":
         return True
-    return isinstance(value, str | int | float | Fraction | Decimal | np.number) and not isinstance(value, bool)
+    return isinstance(value, str | int | float | Fraction | Decimal | np.number) and not isinstance(
+        value, bool
+    )
 
 
 def entry_tree(value: object, vocabulary: Vocabulary) -> tuple[str, Tree]:
@@ -104,7 +112,10 @@ def _text(value: object) -> str:
         if _library(value) == "sympy":
             import sympy
 
-            if sum(1 for _ in islice(sympy.preorder_traversal(value), BOUNDS.object_nodes + 1)) > BOUNDS.object_nodes:
+            if (
+                sum(1 for _ in islice(sympy.preorder_traversal(value), BOUNDS.object_nodes + 1))
+                > BOUNDS.object_nodes
+            ):
                 raise AnswerError(f"an expression of more than {BOUNDS.object_nodes} nodes")
         return str(value)
     except (RecursionError, ValueError):  # of integers of thousands of digits
@@ -158,7 +169,9 @@ def _casadi_entries(value: Any, n: int, names: frozenset[str]) -> Any:
 
     if isinstance(value, casadi.Function):
         if not 1 <= value.n_in() <= len(_STATES) or value.n_out() != 1:
-            raise AnswerError(f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result")
+            raise AnswerError(
+                f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result"
+            )
         try:
             states = []
             for name in _STATES[: value.n_in()]:
@@ -170,7 +183,9 @@ def _casadi_entries(value: Any, n: int, names: frozenset[str]) -> Any:
     if isinstance(value, casadi.DM):
         return _squeeze(value.full().tolist())
     if not isinstance(value, casadi.SX):
-        raise AnswerError(f"found casadi.{type(value).__name__}; expected SX, DM or a Function that takes SX")
+        raise AnswerError(
+            f"found casadi.{type(value).__name__}; expected SX, DM or a Function that takes SX"
+        )
     m, n_columns = value.shape
     rows = []
     for i in range(m):
@@ -190,7 +205,9 @@ class _CasadiScalar:
         self.nodes = int(casadi.n_nodes(scalar))
         is_short = self.nodes <= BOUNDS.shown_casadi_nodes
         self.text = (
-            str(scalar)[: BOUNDS.shown_casadi_characters] if is_short else f"a CasADi expression of {self.nodes} nodes"
+            str(scalar)[: BOUNDS.shown_casadi_characters]
+            if is_short
+            else f"a CasADi expression of {self.nodes} nodes"
         )
 
     def tree(self, vocabulary: Vocabulary) -> Tree:
@@ -201,7 +218,10 @@ class _CasadiScalar:
         if self.nodes > BOUNDS.object_nodes:
             raise AnswerError(f"{self.text}; expected at most {BOUNDS.object_nodes}")
         symbols = casadi.symvar(self.scalar)
-        inputs = [read_answer(_counted_from_one(x.name(), self.names, vocabulary), vocabulary) for x in symbols]
+        inputs = [
+            read_answer(_counted_from_one(x.name(), self.names, vocabulary), vocabulary)
+            for x in symbols
+        ]
         try:
             inside = {"x": casadi.SX(casadi.vertcat(*symbols))} if symbols else {}
             graph = Graph.of("answer", inside, {"y": self.scalar})
@@ -229,7 +249,9 @@ def _counted_from_one(name: str, names: Collection[str], vocabulary: Vocabulary)
     if match is None:
         return name
     prefix, number = match[1], int(match[2])
-    numbers = {int(other[2]) for other in map(_NUMBERED.fullmatch, names) if other and other[1] == prefix}
+    numbers = {
+        int(other[2]) for other in map(_NUMBERED.fullmatch, names) if other and other[1] == prefix
+    }
     if 0 in numbers:
         return f"{prefix}{number + 1}"
     n = len(vocabulary.kinds)

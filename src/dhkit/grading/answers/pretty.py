@@ -46,13 +46,19 @@ def in_one_line(text: str) -> str:
     lines = text.strip("\n").splitlines()
     width = max(map(len, lines))
     if len(lines) > BOUNDS.pretty_lines or width > BOUNDS.pretty_columns:
-        raise AnswerError(f"{quote(text)}: more than {BOUNDS.pretty_lines} lines or {BOUNDS.pretty_columns} columns")
+        raise AnswerError(
+            f"{quote(text)}: more than {BOUNDS.pretty_lines} lines or {BOUNDS.pretty_columns} columns"
+        )
     if any(mark in text for mark in "√╲╱⌠⎮"):
-        raise AnswerError(f"{quote(text)}: a root or an integral over several lines; print it with str()")
+        raise AnswerError(
+            f"{quote(text)}: a root or an integral over several lines; print it with str()"
+        )
     try:
         return _Block(tuple(line.ljust(width) for line in lines), 0).text()
     except _LostError as lost:
-        raise AnswerError(f"{quote(text)}: {lost}; were spaces lost? print it in one line, with str()") from None
+        raise AnswerError(
+            f"{quote(text)}: {lost}; were spaces lost? print it in one line, with str()"
+        ) from None
 
 
 class _LostError(Exception):
@@ -123,7 +129,12 @@ class _Block:
                 column += 1
                 continue
             end = column
-            while end < self.width and end not in pieces and self.lines[base][end] == " " and self._is_above(end, base):
+            while (
+                end < self.width
+                and end not in pieces
+                and self.lines[base][end] == " "
+                and self._is_above(end, base)
+            ):
                 end += 1
             if end == column:
                 raise _LostError("a character above or below another")
@@ -136,7 +147,9 @@ class _Block:
 
     def _bracket(self, column: int) -> _Piece | None:
         """Return the tall bracket that begins in a column; None if there is none."""
-        top = next((row for row, line in enumerate(self.lines) if line[column] in _TALL_BRACKETS), None)
+        top = next(
+            (row for row, line in enumerate(self.lines) if line[column] in _TALL_BRACKETS), None
+        )
         if top is None:
             return None
         line = self.lines[top]
@@ -156,7 +169,9 @@ class _Block:
         rows = range(top, bottom + 1)
         if depth or any(self.lines[r][end] not in side for r in rows):
             raise _LostError("a tall bracket that does not close")
-        if any(line[column : end + 1].strip() for r, line in enumerate(self.lines) if r not in rows):
+        if any(
+            line[column : end + 1].strip() for r, line in enumerate(self.lines) if r not in rows
+        ):
             raise _LostError("a character above or below a bracket")
         inner = self.part(slice(top, bottom + 1), slice(column + 1, end))
         text = inner.matrix() if hook == "⎡" else f"({inner.text()})"
@@ -174,7 +189,9 @@ class _Block:
         end, row = max(bars)
         above = self.part(slice(row), slice(column, end))
         below = self.part(slice(row + 1, None), slice(column, end))
-        if not any(line.strip() for line in above.lines) or not any(line.strip() for line in below.lines):
+        if not any(line.strip() for line in above.lines) or not any(
+            line.strip() for line in below.lines
+        ):
             raise _LostError("a bar without a numerator or a denominator")
         top = above.text()
         bottom = below.text()

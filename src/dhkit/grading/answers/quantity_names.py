@@ -52,7 +52,9 @@ class QuantityNames:
 
     def __init__(self, description: Description, names: Names = NO_NAMES) -> None:
         self.n = description.n
-        self.parameters: Mapping[str, str] = {plain_name(name): name for name in description.parameters}
+        self.parameters: Mapping[str, str] = {
+            plain_name(name): name for name in description.parameters
+        }
         self.vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd)
 
     @cached_property
@@ -86,7 +88,11 @@ class QuantityNames:
 
     def entries(self, name: str) -> list[Target]:
         """Return the entries that a name may stand for: several where its digits can be read in two ways."""
-        match = _ENTRY.fullmatch(re.sub(r"[{}]", "", name)) if len(name) <= BOUNDS.entry_name_characters else None
+        match = (
+            _ENTRY.fullmatch(re.sub(r"[{}]", "", name))
+            if len(name) <= BOUNDS.entry_name_characters
+            else None
+        )
         if match is None or self.is_parameter(name):
             return []
         letters, digits, first, second = match.groups()
@@ -99,7 +105,9 @@ class QuantityNames:
             cuts = range(1, len(number))
             readings = [(letters, number)]
             readings += [(letters, number[:k], number[k:]) for k in cuts]
-            readings += [(letters + number[:i], number[i:k], number[k:]) for i, k in combinations(cuts, 2)]
+            readings += [
+                (letters + number[:i], number[i:k], number[k:]) for i, k in combinations(cuts, 2)
+            ]
         targets = chain.from_iterable(self._entry(*reading) for reading in readings)
         return list(dict.fromkeys(targets))
 
@@ -115,7 +123,9 @@ class QuantityNames:
         shape = self.shape(quantity)
         if len(shape) == 1 and len(index) == 2 and index[1] == 0:
             index = index[:1]
-        inside = len(index) == len(shape) and all(0 <= k < length for k, length in zip(index, shape, strict=True))
+        inside = len(index) == len(shape) and all(
+            0 <= k < length for k, length in zip(index, shape, strict=True)
+        )
         return index if inside else None
 
 

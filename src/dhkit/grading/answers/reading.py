@@ -72,7 +72,9 @@ def meaning_of(text: str, vocabulary: Vocabulary) -> Meaning:
     read_answer(text, vocabulary)
     plain = to_plain_grammar(answer_tokens(text, vocabulary), vocabulary, text)
     if len(plain) > BOUNDS.meaning_tokens:
-        raise AnswerError(f"written out, {len(plain)} signs; expected at most {BOUNDS.meaning_tokens}")
+        raise AnswerError(
+            f"written out, {len(plain)} signs; expected at most {BOUNDS.meaning_tokens}"
+        )
     return ("(", *(token.text for token in plain), ")")
 
 
@@ -94,7 +96,9 @@ def _refuse_lines_apart(text: str) -> None:
         depth += nesting(character)
         is_apart = character == "\n" and depth <= 0 and at not in joined
         if is_apart or _BAR.match(plain, at):
-            raise AnswerError(f"{quote(text)}: lines that no operator joins; print the formula in one line, with str()")
+            raise AnswerError(
+                f"{quote(text)}: lines that no operator joins; print the formula in one line, with str()"
+            )
 
 
 def answer_tokens(text: str, vocabulary: Vocabulary) -> list[Token]:
@@ -141,7 +145,9 @@ def without_comments(text: str) -> str:
 def _in_plain_functions(tree: Tree) -> Tree:
     """Return a tree without secants, degrees and the like."""
     plain = with_operands(tree, [_in_plain_functions(part) for part in operands(tree)])
-    return _plain_call(plain.function, plain.arguments, plain.at) if isinstance(plain, Call) else plain
+    return (
+        _plain_call(plain.function, plain.arguments, plain.at) if isinstance(plain, Call) else plain
+    )
 
 
 def _plain_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
@@ -151,7 +157,9 @@ def _plain_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
         return arguments[0]
     expected = 1 + (function in _TWO_ARGUMENTS)
     if len(arguments) != expected:
-        raise AnswerError(f"{function} of {len(arguments)} arguments at position {at + 1}; expected {expected}")
+        raise AnswerError(
+            f"{function} of {len(arguments)} arguments at position {at + 1}; expected {expected}"
+        )
     first = arguments[0]
     match function:
         case "sec" | "csc" | "cot":

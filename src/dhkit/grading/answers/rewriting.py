@@ -80,7 +80,12 @@ class _Rewriting:
         """Take np. off np.sin; no other attribute is read."""
         plain: list[Token] = []
         for token in tokens:
-            if len(plain) > 1 and plain[-1].text == "." and token.kind == "name" and token.text in _ATTRIBUTES:
+            if (
+                len(plain) > 1
+                and plain[-1].text == "."
+                and token.kind == "name"
+                and token.text in _ATTRIBUTES
+            ):
                 module = plain[-2]
                 if module.kind != "name" or module.text not in MODULES:
                     self._fail(module, f"an attribute of {module.text!r}, which is not read,")
@@ -98,7 +103,11 @@ class _Rewriting:
         """
         plain: list[Token] = []
         for token in tokens:
-            if token.text not in ("'", ".'") or not plain or (plain[-1].kind == "sign" and plain[-1].text not in ")]"):
+            if (
+                token.text not in ("'", ".'")
+                or not plain
+                or (plain[-1].kind == "sign" and plain[-1].text not in ")]")
+            ):
                 plain.append(token)
                 continue
             name = plain[-1].text if plain[-1].kind == "name" else ""
@@ -115,12 +124,19 @@ class _Rewriting:
 
         def read_run(k: int) -> tuple[Sequence[Token], int] | None:
             token = tokens[k]
-            is_operand = (token.kind == "name" and token.text not in FUNCTION_NAMES) or token.text in (")", "}")
-            is_of_time = begins_with(tokens, k + 1, "(", "t", ")") or begins_with(tokens, k + 1, "[", "t", "]")
+            is_operand = (
+                token.kind == "name" and token.text not in FUNCTION_NAMES
+            ) or token.text in (")", "}")
+            is_of_time = begins_with(tokens, k + 1, "(", "t", ")") or begins_with(
+                tokens, k + 1, "[", "t", "]"
+            )
             if not is_operand or not is_of_time:
                 return None
             if self.vocabulary.is_exactly("t"):
-                self._fail(token, f"{token.text}(t) may be a function of time, or a product; t is a parameter")
+                self._fail(
+                    token,
+                    f"{token.text}(t) may be a function of time, or a product; t is a parameter",
+                )
             return [token], k + 4
 
         return replace_runs(tokens, read_run)
@@ -164,7 +180,9 @@ class _Rewriting:
         order = 1
         at = k + 1
         if token.text == "d":
-            square = next((len(square) for square in _SQUARED if begins_with(tokens, at, *square)), 0)
+            square = next(
+                (len(square) for square in _SQUARED if begins_with(tokens, at, *square)), 0
+            )
             order = 1 + bool(square)
             at = at + square
             if end := _end_of_over_time(tokens, at, order):
@@ -175,7 +193,11 @@ class _Rewriting:
             end = _end_of_over_time(tokens, stop, order) if stop > at else 0
             return (derivative_by_time(tokens[at:stop], order, token.at), end) if end else None
         squared = re.fullmatch(r"d[2d](\w+)", token.text, re.ASCII)
-        if squared and self.vocabulary.is_position(squared[1]) and begins_with(tokens, k + 1, "/", "dt2"):
+        if (
+            squared
+            and self.vocabulary.is_position(squared[1])
+            and begins_with(tokens, k + 1, "/", "dt2")
+        ):
             return derivative_by_time([Token("name", squared[1], token.at)], 2, token.at), k + 3
         name = token.text[1:]
         end = _end_of_over_time(tokens, k + 1, 1)
@@ -192,7 +214,8 @@ class _Rewriting:
         goes_on = following.kind != "sign" or following.text in ("(", "*", "/")
         if stop == start or following.text == "^" or (goes_on and not is_enclosed):
             self._fail(
-                tokens[k], "a derivative that may reach further than the name after it; put brackets around what"
+                tokens[k],
+                "a derivative that may reach further than the name after it; put brackets around what",
             )
 
     # Names
@@ -230,14 +253,29 @@ class _Rewriting:
         if name in FUNCTION_NAMES and is_exact and following[:1] == ["("]:
             problem = f"{name} (...) may be the parameter {name} times the brackets, or a function; write {name}*(...)"
             self._fail(tokens[k], problem)
-        is_shorthand = name in _SHORTHAND and not is_exact and k + 1 < len(tokens) and tokens[k + 1].kind == "name"
-        if is_shorthand and not vocabulary.is_position(following[0]) and vocabulary.is_exactly(following[0]):
+        is_shorthand = (
+            name in _SHORTHAND
+            and not is_exact
+            and k + 1 < len(tokens)
+            and tokens[k + 1].kind == "name"
+        )
+        if (
+            is_shorthand
+            and not vocabulary.is_position(following[0])
+            and vocabulary.is_exactly(following[0])
+        ):
             self._fail(tokens[k], f"{name} before {following[0][:40]}, which is not an angle,")
         is_number_in_brackets = (
-            len(following) == 3 and following[0] == "(" and following[2] == ")" and following[1].isdecimal()
+            len(following) == 3
+            and following[0] == "("
+            and following[2] == ")"
+            and following[1].isdecimal()
         )
         if vocabulary.is_state(name) and is_number_in_brackets:
-            self._fail(tokens[k], f"{name}({following[1][:20]}) may be a value at a time, or a product; write which")
+            self._fail(
+                tokens[k],
+                f"{name}({following[1][:20]}) may be a value at a time, or a product; write which",
+            )
 
     def _refuse_ambiguous(self, tokens: Sequence[Token], k: int) -> None:
         """Refuse sin2q1, s2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
@@ -263,7 +301,11 @@ class _Rewriting:
         for function in _TRIGONOMETRIC:
             if is_called and name.endswith(function):
                 before = name.removesuffix(function)
-                factors = [*self._split(Token("name", before, at), False), sign("*", at)] if before else []
+                factors = (
+                    [*self._split(Token("name", before, at), False), sign("*", at)]
+                    if before
+                    else []
+                )
                 return [*factors, Token("function", function, at)]
             if name.startswith(function) and vocabulary.is_position(name.removeprefix(function)):
                 angle = vocabulary.find(name.removeprefix(function)) or ()
@@ -284,7 +326,9 @@ class _Rewriting:
 
     def _functions(self, tokens: Sequence[Token]) -> list[Token]:
         """Give functions their brackets, sin q1 and sin 2 q1, and put powers of functions after them, sin^2(q1)."""
-        return replace_runs(tokens, lambda k: self._function(tokens, k) if tokens[k].kind == "function" else None)
+        return replace_runs(
+            tokens, lambda k: self._function(tokens, k) if tokens[k].kind == "function" else None
+        )
 
     def _function(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int]:
         """Return the call of the function at k, and where it ends."""
@@ -312,8 +356,14 @@ class _Rewriting:
         if not argument:
             self._fail(token, f"{name} without an argument")
         following = tokens[end] if end < len(tokens) else sign("", token.at)
-        goes_on = following.kind in ("name", "function") or (argument[-1].text != ")" and following.text == "/")
-        if name in _TRIGONOMETRIC and goes_on and all(x.kind in ("number", "sign") for x in argument):
+        goes_on = following.kind in ("name", "function") or (
+            argument[-1].text != ")" and following.text == "/"
+        )
+        if (
+            name in _TRIGONOMETRIC
+            and goes_on
+            and all(x.kind in ("number", "sign") for x in argument)
+        ):
             self._fail(token, f"{name} of a number, or of more; put its argument in brackets")
         if argument[0].text != "(" or self._closing(argument, 0) != len(argument) - 1:
             argument = in_brackets(argument, token.at)
@@ -327,7 +377,9 @@ class _Rewriting:
         """
         if begins_with(tokens, k, "("):
             return self._closing(tokens, k) + 1
-        while k < len(tokens) and (tokens[k].kind == "number" if is_product else tokens[k].text in "+-"):
+        while k < len(tokens) and (
+            tokens[k].kind == "number" if is_product else tokens[k].text in "+-"
+        ):
             k += 1
         if is_product and begins_with(tokens, k, "("):
             return self._closing(tokens, k) + 1
@@ -336,7 +388,11 @@ class _Rewriting:
     def _closing(self, tokens: Sequence[Token], k: int) -> int:
         """Return where the bracket at k closes."""
         end = closing_bracket(tokens, k)
-        return end if end < len(tokens) else fail(self.text, tokens[k].at, "a bracket that does not close")
+        return (
+            end
+            if end < len(tokens)
+            else fail(self.text, tokens[k].at, "a bracket that does not close")
+        )
 
 
 def _without_methods(tokens: Sequence[Token]) -> list[Token]:
@@ -384,4 +440,6 @@ def _with_product_signs(tokens: Sequence[Token]) -> list[Token]:
             if ends and begins and not (before.kind == "number" == token.kind):
                 result.append(sign("*", token.at))
         result.append(token)
-    return [Token("name", token.text, token.at) if token.kind == "call" else token for token in result]
+    return [
+        Token("name", token.text, token.at) if token.kind == "call" else token for token in result
+    ]

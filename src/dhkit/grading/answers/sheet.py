@@ -72,7 +72,9 @@ QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 _PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,60}", re.ASCII)
 """Name of a package."""
 
-ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L")
+ALIASES = dict(
+    D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L"
+)
 """Other names of quantities."""
 
 
@@ -155,7 +157,9 @@ def read_task(path: Path) -> AnswerSheet:
     return _read(path, "a task", lambda data: _sheet(data, _Checker(str(path)), KEYS["task file"]))
 
 
-def _read(path: Path, expected: str, sheet_from: Callable[[Mapping[str, object]], AnswerSheet]) -> AnswerSheet:
+def _read(
+    path: Path, expected: str, sheet_from: Callable[[Mapping[str, object]], AnswerSheet]
+) -> AnswerSheet:
     text = read_text(path, expected)
     try:
         return sheet_from(toml_document(text))
@@ -241,7 +245,9 @@ class _Checker:
                 hint = f"did you mean {close[0]!r}?" if close else f"expected {', '.join(known)}"
                 raise AnswerError(f"{self.file}: unknown key {prefix}{key[:60]!r}; {hint}")
 
-    def _value(self, data: Mapping[str, object], key: str, prefix: str, default: T, expected: str) -> T:
+    def _value(
+        self, data: Mapping[str, object], key: str, prefix: str, default: T, expected: str
+    ) -> T:
         """Return the value of a key, of the same type as the default."""
         value = data.get(key, default)
         if not isinstance(value, type(default)):
@@ -281,28 +287,43 @@ def _names(checker: _Checker, data: Mapping[str, object]) -> Names:
     checker.keys(data, KEYS["names"], "names.")
     parameters = checker.table(data, "parameters", "names.")
     if len(parameters) > BOUNDS.names:
-        raise checker.error("names.parameters", f"{len(parameters)} names", f"at most {BOUNDS.names}")
+        raise checker.error(
+            "names.parameters", f"{len(parameters)} names", f"at most {BOUNDS.names}"
+        )
     for name, value in parameters.items():
         if not _is_entry(value):
-            raise checker.error(f"names.parameters: {name[:40]!r}", value, "an expression in the robot's parameters")
+            raise checker.error(
+                f"names.parameters: {name[:40]!r}", value, "an expression in the robot's parameters"
+            )
     q, qd, qdd = (
-        checker.texts(data.get(key, []), f"names.{key}", "a list of names, one a joint") for key in ("q", "qd", "qdd")
+        checker.texts(data.get(key, []), f"names.{key}", "a list of names, one a joint")
+        for key in ("q", "qd", "qdd")
     )
     absolute = checker.choice(data, "angles", "names.") == "absolute"
-    state = tuple(part.strip() for part in checker.text(data, "state", "names.").split(",") if part.strip())
+    state = tuple(
+        part.strip() for part in checker.text(data, "state", "names.").split(",") if part.strip()
+    )
     if not all(map(str.isidentifier, state)):
-        raise checker.error("names.state", data["state"], 'names in the order of a state vector, such as "q, qd"')
+        raise checker.error(
+            "names.state", data["state"], 'names in the order of a state vector, such as "q, qd"'
+        )
     further = {name: str(value) for name, value in parameters.items()}
     return Names(q, qd, qdd, absolute, further, state)
 
 
 def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements:
     checker.keys(data, KEYS["task"], "task.")
-    asked = checker.texts(data.get("asked", []), "task.asked", 'a list of quantities such as ["M", "g"]')
+    asked = checker.texts(
+        data.get("asked", []), "task.asked", 'a list of quantities such as ["M", "g"]'
+    )
     for name in asked:
         if not QUANTITY.fullmatch(name):
-            raise checker.error("task.asked", name, "M, C, h, g, tau, K, V, L, A1 ..., T, J, dh or ik")
-    rows = checker.texts(data.get("J_rows", []), "task.J_rows", 'a list of rows such as ["vx", "vy", "wz"]')
+            raise checker.error(
+                "task.asked", name, "M, C, h, g, tau, K, V, L, A1 ..., T, J, dh or ik"
+            )
+    rows = checker.texts(
+        data.get("J_rows", []), "task.J_rows", 'a list of rows such as ["vx", "vy", "wz"]'
+    )
     for k, row in enumerate(rows):
         if row not in JACOBIAN_ROWS or row in rows[:k]:
             raise checker.error("task.J_rows", row, f"each once of {', '.join(JACOBIAN_ROWS)}")
@@ -321,22 +342,31 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
 
 
 def _packages(checker: _Checker, data: Mapping[str, object]) -> tuple[str, ...]:
-    packages = checker.texts(data.get("packages", []), "task.packages", 'a list of packages such as ["numpy", "sympy"]')
+    packages = checker.texts(
+        data.get("packages", []), "task.packages", 'a list of packages such as ["numpy", "sympy"]'
+    )
     for name in packages:
         if not _PACKAGE.fullmatch(name):
             raise checker.error("task.packages", name, "the name of an installed package")
     return packages
 
 
-def _table(checker: _Checker, data: Mapping[str, object]) -> tuple[str, tuple[tuple[str, ...], ...]]:
+def _table(
+    checker: _Checker, data: Mapping[str, object]
+) -> tuple[str, tuple[tuple[str, ...], ...]]:
     checker.keys(data, KEYS["dh"], "answer.dh.")
     rows = data.get("rows")
     if not isinstance(rows, list) or not rows:
         raise checker.error("answer.dh.rows", rows, "a list of rows [theta, d, a, alpha]")
-    texts = tuple(checker.texts(row, f"answer.dh.rows[{k}]", "[theta, d, a, alpha]") for k, row in enumerate(rows))
+    texts = tuple(
+        checker.texts(row, f"answer.dh.rows[{k}]", "[theta, d, a, alpha]")
+        for k, row in enumerate(rows)
+    )
     for k, row in enumerate(texts):
         if len(row) != len(COLUMNS):
-            raise checker.error(f"answer.dh.rows[{k}]", list(row), "four entries: theta, d, a, alpha")
+            raise checker.error(
+                f"answer.dh.rows[{k}]", list(row), "four entries: theta, d, a, alpha"
+            )
     return checker.choice(data, "convention", "answer.dh."), texts
 
 
@@ -345,7 +375,9 @@ def _steps(checker: _Checker, data: Mapping[str, object]) -> tuple[InverseStep, 
     if "branches" in data:
         raise checker.error("answer.ik", "both branches and steps", "one of them")
     steps = data.get("steps")
-    expected = f'1 to {BOUNDS.steps} steps such as {{ joint = 1, equation = "...", solution = "..." }}'
+    expected = (
+        f'1 to {BOUNDS.steps} steps such as {{ joint = 1, equation = "...", solution = "..." }}'
+    )
     if not isinstance(steps, list) or not 0 < len(steps) <= BOUNDS.steps:
         raise checker.error("answer.ik.steps", steps, expected)
     read = [_step(checker, step, f"answer.ik.steps[{k}]", expected) for k, step in enumerate(steps)]
@@ -362,9 +394,13 @@ def _step(checker: _Checker, data: object, place: str, expected: str) -> Inverse
     texts = []
     for key in ("equation", "solution"):
         value = data.get(key, [])
-        several = checker.texts(value if isinstance(value, list) else [value], f"{place}.{key}", "a formula, or a list")
+        several = checker.texts(
+            value if isinstance(value, list) else [value], f"{place}.{key}", "a formula, or a list"
+        )
         if len(several) > BOUNDS.steps:
-            raise checker.error(f"{place}.{key}", f"{len(several)} formulas", f"at most {BOUNDS.steps}")
+            raise checker.error(
+                f"{place}.{key}", f"{len(several)} formulas", f"at most {BOUNDS.steps}"
+            )
         texts.append(tuple(text for text in several if text.strip()))
     if not {"equation", "solution"} & data.keys():
         raise checker.error(place, data, "an equation, a solution, or both")
@@ -375,7 +411,9 @@ def _branches(checker: _Checker, data: Mapping[str, object]) -> tuple[tuple[str,
     checker.keys(data, KEYS["ik"], "answer.ik.")
     branches = data.get("branches")
     if not isinstance(branches, list) or not 0 < len(branches) <= BOUNDS.branches:
-        raise checker.error("answer.ik.branches", branches, f"1 to {BOUNDS.branches} lists of formulas, one a joint")
+        raise checker.error(
+            "answer.ik.branches", branches, f"1 to {BOUNDS.branches} lists of formulas, one a joint"
+        )
     return tuple(
         checker.texts(branch, f"answer.ik.branches[{k}]", "a list of formulas, one a joint")
         for k, branch in enumerate(branches)

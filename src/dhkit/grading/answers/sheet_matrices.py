@@ -30,7 +30,9 @@ class SheetMatrices:
         Which names stand for quantities.
     """
 
-    def __init__(self, answers: Mapping[str, object], vocabulary: Vocabulary, names: QuantityNames) -> None:
+    def __init__(
+        self, answers: Mapping[str, object], vocabulary: Vocabulary, names: QuantityNames
+    ) -> None:
         self.answers = answers
         self.vocabulary = vocabulary
         self.names = names
@@ -44,7 +46,9 @@ class SheetMatrices:
         vocabulary = self.vocabulary
         quantity = self.names.quantity(name)
         # G is taken for a parameter g only where it is not an answer.
-        is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
+        is_answer = (
+            quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
+        )
         if vocabulary.knows(name) and not is_answer:
             return None
         if _VECTOR.fullmatch(plain_name(name)) and vocabulary.is_state(f"{name}1"):
@@ -54,9 +58,13 @@ class SheetMatrices:
         if quantity not in self._read:
             shape = self.names.shape(quantity)
             value = self.answers[quantity]
-            given = given_quantity(quantity, value, shape, vocabulary, self.names, self.without(*unknown, quantity))
+            given = given_quantity(
+                quantity, value, shape, vocabulary, self.names, self.without(*unknown, quantity)
+            )
             if unread := next((entry for entry in given if entry.tree is None), None):
-                raise AnswerError(f"{name}: {Target(quantity, unread.index)} is not read: {unread.error}")
+                raise AnswerError(
+                    f"{name}: {Target(quantity, unread.index)} is not read: {unread.error}"
+                )
             trees = [entry.tree for entry in given if entry.tree is not None]
             columns = shape[1] if len(shape) == 2 else 1
             self._read[quantity] = [trees[k : k + columns] for k in range(0, len(trees), columns)]

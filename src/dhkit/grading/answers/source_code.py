@@ -45,7 +45,9 @@ def source_code(path: Path) -> SourceCode:
     AnswerError
         A file that cannot be read, is not a notebook, or is too long.
     """
-    code = SourceCode(read_text(path, "a program or a paper"), path.suffix.lower(), "line {}".format)
+    code = SourceCode(
+        read_text(path, "a program or a paper"), path.suffix.lower(), "line {}".format
+    )
     if code.suffix == ".ipynb":
         from dhkit.grading.answers.programs.notebook import notebook_code
 

@@ -78,25 +78,35 @@ def executed_source(
 # The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.
 
 
-def _python(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
+def _python(
+    text: str, file: str, line_name: LineName, description: Description, names: Names
+) -> AnswerSheet:
     from dhkit.grading.answers.programs.program_answers import answers_of
     from dhkit.grading.answers.programs.python_program import PythonProgram
     from dhkit.grading.answers.programs.robot_names import RobotNames
     from dhkit.grading.answers.programs.scope import Record
 
-    return answers_of(PythonProgram(text, file, line_name, Record(RobotNames(description, names), "**")), file)
+    return answers_of(
+        PythonProgram(text, file, line_name, Record(RobotNames(description, names), "**")), file
+    )
 
 
-def _matlab(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
+def _matlab(
+    text: str, file: str, line_name: LineName, description: Description, names: Names
+) -> AnswerSheet:
     from dhkit.grading.answers.programs.matlab_program import MatlabProgram
     from dhkit.grading.answers.programs.program_answers import answers_of
     from dhkit.grading.answers.programs.robot_names import RobotNames
     from dhkit.grading.answers.programs.scope import Record
 
-    return answers_of(MatlabProgram(text, file, line_name, Record(RobotNames(description, names), "^")), file)
+    return answers_of(
+        MatlabProgram(text, file, line_name, Record(RobotNames(description, names), "^")), file
+    )
 
 
-def _latex(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
+def _latex(
+    text: str, file: str, line_name: LineName, description: Description, names: Names
+) -> AnswerSheet:
     from dhkit.grading.answers.documents.latex_document import latex_answers
 
     return latex_answers(text, file, line_name, description, names)

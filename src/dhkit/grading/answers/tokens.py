@@ -70,7 +70,9 @@ def to_ascii(text: str) -> tuple[str, list[int]]:
         A character that no formula has, or too many characters.
     """
     if len(text) > BOUNDS.entry_characters:
-        raise AnswerError(f"an entry of {len(text)} characters; expected at most {BOUNDS.entry_characters}")
+        raise AnswerError(
+            f"an entry of {len(text)} characters; expected at most {BOUNDS.entry_characters}"
+        )
     if text.isascii():
         return text, list(range(len(text)))
     pieces: list[str] = []
@@ -82,11 +84,19 @@ def to_ascii(text: str) -> tuple[str, list[int]]:
         if character in _VULGAR_FRACTIONS and pieces and pieces[-1][-1:].isdigit():
             whole = pieces[-1][-1]
             part = _ASCII_TEXTS[character]
-            fail(text, at, f"{whole}{character} may be {whole} + {part} or {whole}*{part}; write one of them")
+            fail(
+                text,
+                at,
+                f"{whole}{character} may be {whole} + {part} or {whole}*{part}; write one of them",
+            )
         if raised:
             piece = ("" if before_raised else "^") + _RAISED[character]
         elif not character.isascii():
-            piece = _ASCII_TEXTS.get(character) or _greek(character) or fail(text, at, _described(character))
+            piece = (
+                _ASCII_TEXTS.get(character)
+                or _greek(character)
+                or fail(text, at, _described(character))
+            )
         before_raised = raised
         pieces.append(piece)
         places += [at] * len(piece)
@@ -117,7 +127,9 @@ def split_tokens(text: str, places: list[int], original: str, allowed: str = "")
         if match := _TOKEN.match(text, at):
             group = match.lastindex or 1
             word = _SAME.get(match[group], match[group])
-            tokens.append(Token(("number", "name", "sign")[group - 1], word, places[match.start(group)]))
+            tokens.append(
+                Token(("number", "name", "sign")[group - 1], word, places[match.start(group)])
+            )
             at = match.end()
             continue
         at += len(text[at:]) - len(text[at:].lstrip())
@@ -189,7 +201,9 @@ def begins_with(tokens: Sequence[Token], k: int, *texts: str) -> bool:
     return [token.text for token in tokens[k : k + len(texts)]] == list(texts)
 
 
-def replace_runs(tokens: Sequence[Token], read_run: Callable[[int], tuple[Sequence[Token], int] | None]) -> list[Token]:
+def replace_runs(
+    tokens: Sequence[Token], read_run: Callable[[int], tuple[Sequence[Token], int] | None]
+) -> list[Token]:
     """Return tokens with some runs of them replaced.
 
     Parameters
@@ -217,7 +231,9 @@ def rate_name(name: str, dots: str) -> str:
 def _greek(character: str) -> str:
     """Return a Greek letter's name, apart from what comes before it: theta, omega, Sigma."""
     name = unicodedata.name(character, "")
-    match = re.fullmatch(r"GREEK (SMALL|CAPITAL) LETTER ([A-Z]+)|GREEK (PHI|THETA|EPSILON|RHO) SYMBOL", name)
+    match = re.fullmatch(
+        r"GREEK (SMALL|CAPITAL) LETTER ([A-Z]+)|GREEK (PHI|THETA|EPSILON|RHO) SYMBOL", name
+    )
     if match is None:
         return ""
     letter = (match[2] or match[3]).lower()

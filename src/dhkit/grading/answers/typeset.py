@@ -39,7 +39,9 @@ def typeset(tree: Tree) -> tuple[str, str]:
     names = {part.text for part in parts_of(tree) if isinstance(part, Name)}
     symbols = latex_names([name for name in names if not _VARIABLE.fullmatch(name)])
     text = _Writer(str, _plain_call, _plain_product, lambda base, exponent: f"{base}^{exponent}")
-    latex = _Writer(lambda name: _latex_name(name, symbols), _latex_call, _latex_product, _latex_power)
+    latex = _Writer(
+        lambda name: _latex_name(name, symbols), _latex_call, _latex_product, _latex_power
+    )
     return text.of(tree).text, latex.of(tree).text
 
 
@@ -98,7 +100,9 @@ class _Writer(Algebra[_Text]):
         return _Text(self._write_name(tree.text), _ATOM)
 
     def call(self, tree: Call) -> _Text:
-        return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), _ATOM)
+        return _Text(
+            self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), _ATOM
+        )
 
     def power(self, tree: Power) -> _Text:
         base = self.of(tree.base)
@@ -109,7 +113,9 @@ class _Writer(Algebra[_Text]):
         return _Text(self._write_product(factors), _PRODUCT)
 
     def sum(self, terms: Sequence[tuple[bool, _Text]]) -> _Text:
-        signed = "".join(f" + {one.text}" if added else f" - {one.inside(_PRODUCT)}" for added, one in terms)
+        signed = "".join(
+            f" + {one.text}" if added else f" - {one.inside(_PRODUCT)}" for added, one in terms
+        )
         return _Text(signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}", _SUM)
 
 

@@ -19,12 +19,25 @@ Meaning: TypeAlias = tuple[str, ...]
 """Tokens that a name stands for, in the robot's own names."""
 
 _SPELLINGS = (
-    dict(sin="sin Sin SIN s", cos="cos Cos COS c", tan="tan Tan TAN", asin="asin arcsin ArcSin Asin ASIN")
+    dict(
+        sin="sin Sin SIN s",
+        cos="cos Cos COS c",
+        tan="tan Tan TAN",
+        asin="asin arcsin ArcSin Asin ASIN",
+    )
     | dict(acos="acos arccos ArcCos Acos ACOS", atan="atan arctan ArcTan Atan ATAN")
     | dict(atan2="atan2 arctan2 Atan2 ATAN2", sqrt="sqrt Sqrt SQRT", hypot="hypot")
-    | dict(abs="abs Abs ABS fabs", sign="sign Sign sgn", exp="exp Exp", pow="pow Pow power", square="square")
+    | dict(
+        abs="abs Abs ABS fabs",
+        sign="sign Sign sgn",
+        exp="exp Exp",
+        pow="pow Pow power",
+        square="square",
+    )
     | dict(min="min Min fmin", max="max Max fmax", sec="sec Sec", csc="csc Csc", cot="cot Cot")
-    | dict(sind="sind", cosd="cosd", tand="tand", radians="radians deg2rad", degrees="degrees rad2deg")
+    | dict(
+        sind="sind", cosd="cosd", tand="tand", radians="radians deg2rad", degrees="degrees rad2deg"
+    )
     | dict(asind="asind", acosd="acosd", atand="atand", atan2d="atan2d")
     | dict(Rational="Rational", number="Integer Float S sympify")
 )
@@ -52,7 +65,8 @@ _DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2,
 
 _LETTERS = "|".join(sorted((*_ANGLES, *_SLIDES), key=len, reverse=True))
 _VARIABLE = re.compile(
-    rf"(dot|ddot|d|dd|d2|D|DD)??({_LETTERS})(d|dot|p|dd|ddot|pp)??(\d+)(d|dot|p|dd|ddot|pp)?", re.ASCII
+    rf"(dot|ddot|d|dd|d2|D|DD)??({_LETTERS})(d|dot|p|dd|ddot|pp)??(\d+)(d|dot|p|dd|ddot|pp)?",
+    re.ASCII,
 )
 _SINE_OR_COSINE = re.compile(r"([csCS]|cos|sin|[csCS](?:q|th|theta|t))(\d(?:[pm]?\d)*)", re.ASCII)
 """The sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
@@ -95,7 +109,9 @@ class Vocabulary:
         sums: Sequence[Sequence[int]] = (),
     ) -> None:
         self.kinds = description.kinds
-        self.sums = tuple(tuple(joints) for joints in sums) or tuple((i,) for i in range(description.n))
+        self.sums = tuple(tuple(joints) for joints in sums) or tuple(
+            (i,) for i in range(description.n)
+        )
         self.symbols = tuple(description.parameters)
         self.own: dict[str, Meaning] = {}
         self.numbers = _numbering(q) or {str(i + 1): i + 1 for i in range(description.n)}
@@ -116,11 +132,15 @@ class Vocabulary:
 
     def _name_joints(self, given: Sequence[str], kind: str) -> None:
         if given and len(given) != len(self.kinds):
-            raise AnswerError(f"names: {kind}: found {len(given)} names; expected {len(self.kinds)}, one a joint")
+            raise AnswerError(
+                f"names: {kind}: found {len(given)} names; expected {len(self.kinds)}, one a joint"
+            )
         for i, name in enumerate(given, start=1):
             own = plain_name(name)
             if not re.fullmatch(r"[A-Za-z]\w*", own, re.ASCII):
-                raise AnswerError(f"names: {kind}: found {quote(name)}; expected a name such as th1")
+                raise AnswerError(
+                    f"names: {kind}: found {quote(name)}; expected a name such as th1"
+                )
             self._add(own, self._own_variable(kind, i))
             if kind == "q":
                 for order, rate in ((1, "qd"), (2, "qdd")):
@@ -216,7 +236,11 @@ class Vocabulary:
         if why := self._ambiguous(plain):
             self.refused[plain] = why
             return None
-        meaning = self._joint_variable(plain) or self._sine_or_cosine(plain) or (self.gravity if plain == "g" else None)
+        meaning = (
+            self._joint_variable(plain)
+            or self._sine_or_cosine(plain)
+            or (self.gravity if plain == "g" else None)
+        )
         if meaning is None and len(self._by_lower_case.get(plain.lower(), ())) == 1:
             (symbol,) = self._by_lower_case[plain.lower()]
             self.taken_for[name] = symbol
@@ -244,19 +268,27 @@ class Vocabulary:
     def _joint_variable(self, name: str) -> Meaning | None:
         """Return a joint's variable, rate or acceleration, in any of the usual spellings."""
         angular = _RATES.fullmatch(name)
-        if angular and angular[1] in self.numbers and self.kinds[self.numbers[angular[1]] - 1] == "R":
+        if (
+            angular
+            and angular[1] in self.numbers
+            and self.kinds[self.numbers[angular[1]] - 1] == "R"
+        ):
             self.taken_for[name] = f"the rate of joint {self.numbers[angular[1]]}"
             return self._own_variable("qd", self.numbers[angular[1]])
         match = _VARIABLE.fullmatch(name)
         if match is None:
-            alone = len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
+            alone = (
+                len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
+            )
             return self._joint_variable(name + "1") if alone else None
         before, letter, between, number, after = match.groups()
         joints = self._numbered(number)
         if not joints:
             return None
         marks = [mark for mark in (before, between, after) if mark]
-        if len(marks) > 1 or (letter in _SLIDES and letter not in _ANGLES and self.kinds[joints[0] - 1] == "R"):
+        if len(marks) > 1 or (
+            letter in _SLIDES and letter not in _ANGLES and self.kinds[joints[0] - 1] == "R"
+        ):
             return None
         dots = _DOTS[marks[0]] if marks else 0
         kind = ("q", "qd", "qdd")[dots]
@@ -336,9 +368,17 @@ class Vocabulary:
             known += [f"q{i}", f"qd{i}", f"qdd{i}", f"c{i}", f"s{i}"]
         known = [other for other in known if len(other) <= BOUNDS.name_characters]
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        own = (other for other in self.own if len(other) <= BOUNDS.name_characters and other not in self.aliases)
+        own = (
+            other
+            for other in self.own
+            if len(other) <= BOUNDS.name_characters and other not in self.aliases
+        )
         listed = [*self.further[:4:3], *own, *self.symbols, "q1", "qd1", "c1", "s1"]
-        return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
+        return (
+            f"did you mean {close[0]!r}?"
+            if close
+            else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
+        )
 
 
 def _sum_of(terms: Sequence[Meaning]) -> Meaning:

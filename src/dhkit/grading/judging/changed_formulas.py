@@ -39,10 +39,16 @@ def has_call(tree: Tree, functions: Sequence[str]) -> bool:
     return any(isinstance(part, Call) and part.function in functions for part in parts_of(tree))
 
 
-def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]) -> Tree:
+def with_calls_changed(
+    tree: Tree, functions: Sequence[str], change: Callable[[Call], Tree]
+) -> Tree:
     """Return a formula with all calls of the functions changed; the formula itself if it has none."""
-    changed = with_operands(tree, [with_calls_changed(child, functions, change) for child in operands(tree)])
-    return change(changed) if isinstance(changed, Call) and changed.function in functions else changed
+    changed = with_operands(
+        tree, [with_calls_changed(child, functions, change) for child in operands(tree)]
+    )
+    return (
+        change(changed) if isinstance(changed, Call) and changed.function in functions else changed
+    )
 
 
 def minus(tree: Tree) -> Tree:
@@ -126,4 +132,6 @@ def _terms(tree: Tree) -> list[Tree]:
 
 
 def _is_square(tree: Tree) -> bool:
-    return isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2
+    return (
+        isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2
+    )

@@ -108,7 +108,9 @@ class Consistency:
     def rates(self, generator: Callable[[Ring, int], Element]) -> Elements:
         """Return the rates (``Ring.rate``) or accelerations of the student's variables, shape (n,)."""
         ring = self.truth.lagrangian.arm.ring
-        return self.truth.coordinates.rates(element_array([generator(ring, i) for i in range(self.n)]))
+        return self.truth.coordinates.rates(
+            element_array([generator(ring, i) for i in range(self.n)])
+        )
 
 
 class _Route(NamedTuple):
@@ -159,7 +161,9 @@ def _velocity_torques(parts: Consistency, M: Elements) -> Elements:
 def _torques(parts: Consistency, M: Elements, h: Elements, g: Elements) -> Elements:
     """Return tau = M ydd + h + g, with viscous friction if tau includes it, shape (n,)."""
     torques = M @ parts.rates(Ring.acceleration) + h + g
-    friction = parts.truth.coordinates.in_y("tau", parts.truth.viscous) if parts.truth.friction else 0
+    friction = (
+        parts.truth.coordinates.in_y("tau", parts.truth.viscous) if parts.truth.friction else 0
+    )
     return torques + friction
 
 

@@ -137,7 +137,11 @@ class Coordinates:
         """Return the derivative by variable i's rate."""
         return self._differentiate(Element.by_rate, element, i)
 
-    def _differentiate(self, derivative: Callable[[Element, int], Element], element: Element, i: int) -> Element:
+    def _differentiate(
+        self, derivative: Callable[[Element, int], Element], element: Element, i: int
+    ) -> Element:
         """Return the derivative by variable i, or its rate: df/dy_i = sum over j of df/dq_j B_ji, since q = B y."""
         ring = element.ring
-        return ring.sum(derivative(element, j) * int(self.B[j, i]) for j in range(ring.n) if self.B[j, i])
+        return ring.sum(
+            derivative(element, j) * int(self.B[j, i]) for j in range(ring.n) if self.B[j, i]
+        )

@@ -85,7 +85,9 @@ def enclosed(
         try:
             given = {name: iv.mpf(x) for name, x in values.items() if name in used}
             numbers = {**_units(digits), **given}
-            evaluation = Evaluation(numbers, partial(_rational, digits=digits), _functions(), _power, _divide)
+            evaluation = Evaluation(
+                numbers, partial(_rational, digits=digits), _functions(), _power, _divide
+            )
             interval = evaluation.of(tree)
             with mpmath.workdps(digits):
                 middle = mpmath.mpf(interval.mid)
@@ -117,7 +119,11 @@ def _units(digits: int) -> Mapping[str, _Interval]:
     """Return pi and the units in the working precision, which is ``digits``."""
     from mpmath import iv
 
-    units = {name: _rational(unit.rational, digits) for name, unit in CONSTANTS.items() if unit.rational is not None}
+    units = {
+        name: _rational(unit.rational, digits)
+        for name, unit in CONSTANTS.items()
+        if unit.rational is not None
+    }
     return {**units, "pi": +iv.pi, "deg": iv.pi / 180}
 
 

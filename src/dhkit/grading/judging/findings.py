@@ -162,7 +162,11 @@ def _proof_statement(by: Comparison, divisors: Sequence[Element]) -> str:
     if not divisors:
         parameters = "" if by.condition else " and every value of the parameters"
         return f"{_PROVED}{by.condition}, for every state{parameters}"
-    short = [divisor for divisor in divisors[:_MAX_NAMED_DIVISORS] if len(divisor) <= BOUNDS.written_terms]
+    short = [
+        divisor
+        for divisor in divisors[:_MAX_NAMED_DIVISORS]
+        if len(divisor) <= BOUNDS.written_terms
+    ]
     texts = [plain_text(readable(by.arm, divisor)) for divisor in short]
     more = " or another divisor is 0" if len(texts) < len(divisors) else ""
     zeros = " or ".join(f"{text} = 0" for text in texts) + more
@@ -233,7 +237,9 @@ def _find_witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
                 state[f"{kind}{i + 1}"] = float(np.round(rng.uniform(-1.5, 1.5), 1))
         parameters = dict(arm.parameters)
         if k >= _WITNESS_TRIALS // 2:
-            parameters |= {p: float(np.round(v * rng.uniform(0.5, 2.0), 3)) for p, v in parameters.items()}
+            parameters |= {
+                p: float(np.round(v * rng.uniform(0.5, 2.0), 3)) for p, v in parameters.items()
+            }
 
         value = float(doubles(tree, {**parameters, **state}))
         generators = arm.ring.values({**arm.values, **parameters}, *state_arrays(state, arm.n))
@@ -271,9 +277,13 @@ def _sample(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
 
     nodes = sum(1 for _ in parts_of(tree)) + len(truth)
     if by.up_to_constant is None:
-        raise AnswerError(f"outside the exact ring ({reason}), where L is not judged up to a total derivative")
+        raise AnswerError(
+            f"outside the exact ring ({reason}), where L is not judged up to a total derivative"
+        )
     if nodes > BOUNDS.sampled_nodes:
-        raise AnswerError(f"outside the exact ring ({reason}), and too long to be tried: {nodes} terms and factors")
+        raise AnswerError(
+            f"outside the exact ring ({reason}), and too long to be tried: {nodes} terms and factors"
+        )
     with mpmath.workdps(sampling.DIGITS):
         count = max(BOUNDS.fewest_states, min(BOUNDS.states, BOUNDS.evaluations // nodes))
         every = _STATES_PER_SET if by.up_to_constant else 1
@@ -308,7 +318,12 @@ def _split_constants(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]
 
 
 def _first_difference(
-    tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Iterable[sampling.Sample]
+    tree: Tree,
+    nodes: int,
+    truth: Element,
+    by: Comparison,
+    reason: str,
+    states: Iterable[sampling.Sample],
 ) -> Finding | int:
     """Return the finding at the first state where answer and truth differ; if none does, the number of states tried.
 
@@ -342,7 +357,9 @@ def _first_difference(
             # The error of the state that sets the zero is that of all states after it, however small their values.
             size = sampling.MIN_SIZE if sets_zero else max(abs(right), sampling.MIN_SIZE)
             tolerance = sampling.TOLERANCE / 10 * size
-            value, digits = enclosed(tree, nodes, state.names, tolerance, relative=not by.up_to_constant)
+            value, digits = enclosed(
+                tree, nodes, state.names, tolerance, relative=not by.up_to_constant
+            )
         except (TooLargeError, LostDigitsError):
             raise
         except AnswerError as error:

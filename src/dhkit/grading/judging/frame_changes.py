@@ -18,21 +18,34 @@ class Change(Enum):
     """Kind of a change, with the text that a report prints."""
 
     Z_REVERSED = "frame {number}'s z axis points the other way"
-    Z_ELSEWHERE = "frame {number}'s z axis points elsewhere: along {vector} of the file's frame {number}"
+    Z_ELSEWHERE = (
+        "frame {number}'s z axis points elsewhere: along {vector} of the file's frame {number}"
+    )
     X_REVERSED = "frame {number}'s x axis points the other way"
     X_TURNED = "frame {number}'s x axis is another: turned by {first:.6g} degrees about z"
     X_ELSEWHERE = "frame {number}'s x axis is another: along {vector}"
-    ORIGIN_ELSEWHERE = "frame {number}'s origin is elsewhere: at {vector} m in the file's frame {number}"
+    ORIGIN_ELSEWHERE = (
+        "frame {number}'s origin is elsewhere: at {vector} m in the file's frame {number}"
+    )
     FRAME_SLID = "frame {number} is slid along its z axis, by {first:.6g} m"
     JOINT_REVERSED = "q{number} is counted the other way round"
     JOINT_HALF_TURN = "q{number} is counted from the other end: by 180 degrees"
-    JOINT_TURNED = "q{number} is counted from another zero: there the file's q{number} is {first:.6g} degrees"
-    JOINT_SLID = "q{number} is counted from another zero: there the file's q{number} is {first:.6g} m"
+    JOINT_TURNED = (
+        "q{number} is counted from another zero: there the file's q{number} is {first:.6g} degrees"
+    )
+    JOINT_SLID = (
+        "q{number} is counted from another zero: there the file's q{number} is {first:.6g} m"
+    )
 
     @property
     def concerns_joint(self) -> bool:
         """Whether the change is one of a joint variable, and not of a frame."""
-        return self in (Change.JOINT_REVERSED, Change.JOINT_HALF_TURN, Change.JOINT_TURNED, Change.JOINT_SLID)
+        return self in (
+            Change.JOINT_REVERSED,
+            Change.JOINT_HALF_TURN,
+            Change.JOINT_TURNED,
+            Change.JOINT_SLID,
+        )
 
 
 @dataclass(frozen=True)
@@ -87,7 +100,9 @@ def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
         yield FrameChange(Change.FRAME_SLID, i, (float(D[2, 3]),))
 
 
-def joint_changes(i: int, is_revolute: bool, sense: float, offset: float, tolerance: float) -> Iterator[FrameChange]:
+def joint_changes(
+    i: int, is_revolute: bool, sense: float, offset: float, tolerance: float
+) -> Iterator[FrameChange]:
     """Yield the changes of joint i, from 1.
 
     Parameters

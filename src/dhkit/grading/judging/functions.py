@@ -68,7 +68,9 @@ class _SampledValues:
     verdict: Verdict
 
 
-def judge_function(name: str, function: Callable[..., object], truth: Truth, seed: int = 0) -> JudgedQuantity:
+def judge_function(
+    name: str, function: Callable[..., object], truth: Truth, seed: int = 0
+) -> JudgedQuantity:
     """Judge a quantity that is a function of (q), (q, qd) or (q, qd, qdd), each of shape (n,), SI units and rad.
 
     The function is called in a process of its own.
@@ -215,7 +217,9 @@ def _call_at_states(
     def work() -> bytes:
         try:
             # A sample is one row of each of the arrays q, qd and qdd.
-            results = [_call(name, function, list(sample), shape) for sample in zip(*states, strict=True)]
+            results = [
+                _call(name, function, list(sample), shape) for sample in zip(*states, strict=True)
+            ]
         except AnswerError as error:
             return _ERROR_MARK + str(error).encode("utf-8", "replace")
         return np.array(results).tobytes()
@@ -241,11 +245,15 @@ def _argument_count(name: str, function: Callable[..., object]) -> int:
             f"{name}: a function whose arguments cannot be seen; expected (q), (q, qd) or (q, qd, qdd)"
         ) from None
     if not 1 <= count <= len(_STATES):
-        raise AnswerError(f"{name}: a function of {count} arguments; expected (q), (q, qd) or (q, qd, qdd)")
+        raise AnswerError(
+            f"{name}: a function of {count} arguments; expected (q), (q, qd) or (q, qd, qdd)"
+        )
     return count
 
 
-def _call(name: str, function: Callable[..., object], arguments: list[Array], shape: tuple[int, ...]) -> Array:
+def _call(
+    name: str, function: Callable[..., object], arguments: list[Array], shape: tuple[int, ...]
+) -> Array:
     """Return a function's result at one state, in a shape."""
     try:
         returned = np.asarray(function(*arguments))
@@ -253,7 +261,9 @@ def _call(name: str, function: Callable[..., object], arguments: list[Array], sh
             raise TypeError("complex numbers; expected real ones")
         result = returned.astype(float)
     except Exception as error:
-        raise AnswerError(f"{name}: the function fails: {type(error).__name__}: {str(error)[:200]}") from error
+        raise AnswerError(
+            f"{name}: the function fails: {type(error).__name__}: {str(error)[:200]}"
+        ) from error
     if result.size != np.prod(shape, dtype=int):
         raise AnswerError(f"{name}: the function returns shape {result.shape}; expected {shape}")
     return result.reshape(shape)
@@ -263,7 +273,9 @@ def _finding(differs: Any, sampled: _SampledValues, place: tuple[int, ...]) -> F
     """Return the finding on an entry, given a mask (_SAMPLES,) of the states at which it differs from the truth."""
     if not differs.any():
         found = "agrees" if sampled.verdict is Verdict.SAMPLED else "equal to the truth"
-        statement = f"not proved, since it is a function: {found} at {_SAMPLES} random states, in doubles"
+        statement = (
+            f"not proved, since it is a function: {found} at {_SAMPLES} random states, in doubles"
+        )
         return Finding(sampled.verdict, statement)
 
     gap = np.moveaxis(np.abs(sampled.answer - sampled.expected), 0, -1)[place]

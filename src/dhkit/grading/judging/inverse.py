@@ -19,7 +19,14 @@ from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.catalogue import hint_of, sentence_of
-from dhkit.grading.grade_report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name
+from dhkit.grading.grade_report import (
+    Diagnosis,
+    Entry,
+    KinematicJudgement,
+    Verdict,
+    Witness,
+    entry_name,
+)
 from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import with_signs_changed
@@ -188,12 +195,16 @@ def _check(description: Description, branches: Sequence[Sequence[Tree]]) -> None
     known = {*POSE_NAMES, *lengths, *CONSTANTS}
     for b, branch in enumerate(branches, start=1):
         if len(branch) != n:
-            raise AnswerError(f"ik, branch {b}: {len(branch)} formula{'s' * (len(branch) != 1)}; expected {n}")
+            raise AnswerError(
+                f"ik, branch {b}: {len(branch)} formula{'s' * (len(branch) != 1)}; expected {n}"
+            )
         for k, tree in enumerate(branch):
             where = f"ik, branch {b}, q{k + 1}"
             nodes = sum(1 for _ in islice(parts_of(tree), BOUNDS.formula_nodes + 1))
             if nodes > BOUNDS.formula_nodes:
-                raise AnswerError(f"{where}: a formula of more than {BOUNDS.formula_nodes} terms and factors")
+                raise AnswerError(
+                    f"{where}: a formula of more than {BOUNDS.formula_nodes} terms and factors"
+                )
 
             others = {f"q{i + 1}" for i in range(n) if i != k}
             unknown = sorted(names_of(tree) - known - others)
@@ -212,7 +223,9 @@ def _in_order(branch: Branch, explanations: Sequence[Explanation]) -> list[Expla
     return sorted(explanations, key=lambda explanation: branch.rank(explanation.joint or 0))
 
 
-def _entry(k: int, branch: Branch, explanations: Sequence[Explanation], repeats: int | None) -> Entry:
+def _entry(
+    k: int, branch: Branch, explanations: Sequence[Explanation], repeats: int | None
+) -> Entry:
     """Return the entry of branch k, from 0; ``repeats`` is the number of an earlier branch that is the same, from 0."""
     if branch.is_right and repeats is None:
         return Entry("ik", (k,), Verdict.CORRECT, statement=str(Closure.of(branch)))
@@ -252,8 +265,16 @@ def _diagnosis(k: int, explanation: Explanation) -> Diagnosis:
     elif explanation.is_near:
         sentence = f"The joint values are near to a solution, but do not bring the tool to the pose to {CLOSES:g}."
     else:
-        sentence = "The joint values do not bring the tool to the pose; no single mistake explains it."
-    return Diagnosis(explanation.mistake, sentence, where, (entry_name("ik", (k,)),), hint_of(explanation.mistake))
+        sentence = (
+            "The joint values do not bring the tool to the pose; no single mistake explains it."
+        )
+    return Diagnosis(
+        explanation.mistake,
+        sentence,
+        where,
+        (entry_name("ik", (k,)),),
+        hint_of(explanation.mistake),
+    )
 
 
 def _diagnose_duplicate(answers: Sequence[Branch], i: int, j: int) -> Diagnosis:
@@ -265,7 +286,9 @@ def _diagnose_duplicate(answers: Sequence[Branch], i: int, j: int) -> Diagnosis:
             mistake = "elbow_sign"
             break
     sentence = sentence_of(mistake, detail=f"it gives the same as branch {i + 1}")
-    return Diagnosis(mistake, sentence, f"ik, branch {j + 1}", (entry_name("ik", (j,)),), hint_of(mistake))
+    return Diagnosis(
+        mistake, sentence, f"ik, branch {j + 1}", (entry_name("ik", (j,)),), hint_of(mistake)
+    )
 
 
 def _other_signs(branch: Branch) -> Iterator[tuple[Tree, ...]]:
@@ -276,7 +299,10 @@ def _other_signs(branch: Branch) -> Iterator[tuple[Tree, ...]]:
             yield branch.with_tree(joint, tree).trees
 
     # The last change of a formula is that of all its roots.
-    yield tuple(changed[-1] if changed else tree for tree, changed in zip(branch.trees, changes, strict=True))
+    yield tuple(
+        changed[-1] if changed else tree
+        for tree, changed in zip(branch.trees, changes, strict=True)
+    )
 
 
 def _notes(poses: Poses, solutions: int | None, covered: int | None) -> tuple[Note, ...]:

@@ -127,7 +127,11 @@ class Branch:
         """
         every_pose = np.ones(len(self.closed), dtype=bool)
         solutions = self.poses.solutions
-        if self.judged_joint is not None or not np.any(self.closed) or not self.poses.has_closed_form:
+        if (
+            self.judged_joint is not None
+            or not np.any(self.closed)
+            or not self.poses.has_closed_form
+        ):
             return every_pose
 
         # Share of the solved poses at which each exact branch has the joint values of this one, shape (B,).

@@ -17,7 +17,14 @@ from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging import changed_formulas as formulas
 from dhkit.grading.judging.bounds import BOUNDS
-from dhkit.grading.judging.changed_formulas import applied, leaf_text, minus, square_of, times, with_term
+from dhkit.grading.judging.changed_formulas import (
+    applied,
+    leaf_text,
+    minus,
+    square_of,
+    times,
+    with_term,
+)
 
 ORDER = (
     "atan2_arguments",
@@ -174,7 +181,11 @@ def edits_of_parts(tree: Tree, lengths: Lengths, mistakes: Collection[str] = ORD
 
 def _angles(tree: Tree) -> list[frozenset[str]]:
     """Return the variables of each angle whose sine or cosine a formula contains, without repetition."""
-    calls = [part for part in parts_of(tree) if isinstance(part, Call) and part.function in ("sin", "cos")]
+    calls = [
+        part
+        for part in parts_of(tree)
+        if isinstance(part, Call) and part.function in ("sin", "cos")
+    ]
     return list(dict.fromkeys(frozenset(names_of(call)) for call in calls))
 
 
@@ -192,7 +203,10 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     """Yield replacements of names in formulas: another component, another length, a component less an offset."""
     names = set().union(*map(names_of, trees))
     if names & {"r12", "r13", "r21", "r23", "r31", "r32"}:
-        yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i, j in product("123", repeat=2)}
+        yield (
+            "rotation_matrix_transposed",
+            {f"r{i}{j}": Name(f"r{j}{i}", 0) for i, j in product("123", repeat=2)},
+        )
     for a, b in combinations(_POSITIONS, 2):
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
@@ -207,7 +221,9 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     for place, length in enumerate(lengths.trees[: BOUNDS.offset_lengths]):
         of_tool = lengths.is_of_tool(place)
         for added in (False, True):
-            yield from _other_points(names, length, added, of_tool, of_tool and leaf_text(length) in contained)
+            yield from _other_points(
+                names, length, added, of_tool, of_tool and leaf_text(length) in contained
+            )
 
     # Another column of the rotation: the tool's z axis for its x axis.
     for j, k in combinations("123", 2):
@@ -255,7 +271,10 @@ def _other_points(
     if not names & {*_POSITIONS}:
         return
     for column in "123":
-        yield "tool_length_forgotten" if of_tool else "length_forgotten", _along_axis(column, added, length)
+        yield (
+            "tool_length_forgotten" if of_tool else "length_forgotten",
+            _along_axis(column, added, length),
+        )
         if is_counted:
             twice = times(Number(Fraction(2), "2", 0), length)
             yield "tool_length_added", _along_axis(column, added, twice)
@@ -272,7 +291,9 @@ def _along_axis(column: str, added: bool, length: Tree) -> dict[str, Tree]:
 
 def _other_angles(names: set[str]) -> Iterator[tuple[str, dict[str, Tree]]]:
     """Yield replacements of joint angles: sums of neighbours for one of them, and angles from another zero."""
-    joints = sorted((name for name in names if formulas.is_joint(name)), key=lambda name: int(name[1:]))
+    joints = sorted(
+        (name for name in names if formulas.is_joint(name)), key=lambda name: int(name[1:])
+    )
     for name in joints:
         own = Name(name, 0)
         last = int(name[1:])
@@ -281,7 +302,9 @@ def _other_angles(names: set[str]) -> Iterator[tuple[str, dict[str, Tree]]]:
         ranges = [(first, last) for first in range(1, last)]
         ranges += [(last, last + 1), (last, last + 2)]
         for first, end in ranges:
-            angles: list[tuple[bool, Tree]] = [(True, Name(f"q{i}", 0)) for i in range(first, end + 1)]
+            angles: list[tuple[bool, Tree]] = [
+                (True, Name(f"q{i}", 0)) for i in range(first, end + 1)
+            ]
             yield "sum_of_angles_forgotten", {name: Sum(tuple(angles))}
 
         for other in joints:
@@ -351,7 +374,9 @@ def _triangle_changes(
     tree: Tree, is_revolute: bool, others: Sequence[str], lengths: Lengths
 ) -> Iterator[tuple[str, Tree]]:
     """Yield a formula plus or minus the angle beta between a link and the line to the end of the next link."""
-    arcs = sum(isinstance(part, Call) and part.function in ("atan2", *_ARCS) for part in parts_of(tree))
+    arcs = sum(
+        isinstance(part, Call) and part.function in ("atan2", *_ARCS) for part in parts_of(tree)
+    )
     if not is_revolute or arcs != 1:
         return
     for name in others:
@@ -397,7 +422,9 @@ def _part_edits(
         # A squared sum is a component of the point, and not a law of cosines of its own.
         is_component = isinstance(tree, Power) and isinstance(child, Sum)
         child_in_law = (in_law and not is_component) or formulas.is_law(child)
-        yield from _part_edits(child, lengths, mistakes, partial(_rebuild_around, rebuild, tree, k), child_in_law)
+        yield from _part_edits(
+            child, lengths, mistakes, partial(_rebuild_around, rebuild, tree, k), child_in_law
+        )
 
 
 def _rebuild_around(rebuild: _Rebuild, tree: Tree, k: int, part: Tree) -> Tree:
@@ -414,7 +441,11 @@ def _square_mistake(in_law: bool) -> str:
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     """Yield mistakes in a part, each with the part corrected."""
     if isinstance(tree, Sum | Call):
-        used = [length for length in lengths.trees[: BOUNDS.offset_lengths] if leaf_text(length) in names_of(tree)]
+        used = [
+            length
+            for length in lengths.trees[: BOUNDS.offset_lengths]
+            if leaf_text(length) in names_of(tree)
+        ]
         for one, two in combinations(used, 2):
             change: dict[str, Tree] = {leaf_text(one): two, leaf_text(two): one}
             yield "lengths_exchanged", formulas.renamed(tree, change)
@@ -496,8 +527,14 @@ def _call_changes(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
             yield "elbow_sign", minus(call)
             # acos(-x) = pi - acos(x): the angle inside the triangle instead of the joint's.
             has_law = any(map(formulas.is_law, parts_of(first)))
-            yield "supplement" if has_law else "term_sign", replace(call, arguments=(minus(first), *rest))
-            yield "term_function", replace(call, function="asin" if call.function == "acos" else "acos")
+            yield (
+                "supplement" if has_law else "term_sign",
+                replace(call, arguments=(minus(first), *rest)),
+            )
+            yield (
+                "term_function",
+                replace(call, function="asin" if call.function == "acos" else "acos"),
+            )
         case "sqrt":
             if not formulas.is_constant(call):
                 yield "elbow_sign", minus(call)
@@ -505,7 +542,9 @@ def _call_changes(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
     yield _square_mistake(in_law), square_of(call)
 
 
-def _sum_changes(terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
+def _sum_changes(
+    terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law: bool
+) -> Iterator[tuple[str, Tree]]:
     yield "root_forgotten", applied("sqrt", Sum(terms))
 
     # One more term.
@@ -529,7 +568,10 @@ def _sum_changes(terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law:
     # The square of one term without a power or product, then of all of them.
     bare = [k for k, (_, term) in enumerate(terms) if isinstance(term, Name | Number | Sum)]
     for squares in (*([k] for k in bare), bare):
-        squared = tuple((added, square_of(term) if k in squares else term) for k, (added, term) in enumerate(terms))
+        squared = tuple(
+            (added, square_of(term) if k in squares else term)
+            for k, (added, term) in enumerate(terms)
+        )
         yield _square_mistake(in_law), Sum(squared)
 
 

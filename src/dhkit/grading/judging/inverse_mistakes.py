@@ -37,7 +37,14 @@ _MIN_AGREEING_SHARE = 0.5
 _MIN_EXPLAINED_SHARE = 0.3
 """Smallest share of the failing poses that a mistake must explain to be named where others are made besides."""
 _FREQUENT = frozenset(
-    ("atan2_arguments", "quadrant", "elbow_sign", "degrees_for_radians", "millimetres_for_metres", "joint_sign")
+    (
+        "atan2_arguments",
+        "quadrant",
+        "elbow_sign",
+        "degrees_for_radians",
+        "millimetres_for_metres",
+        "joint_sign",
+    )
 )
 """Mistakes that are named if they explain a good part of the failing poses by themselves."""
 
@@ -96,7 +103,9 @@ class MistakeSearch:
         current: Branch | None = branch.sample(BOUNDS.edit_poses)
         while current is not None and not current.is_right:
             joint = current.wrong_joint()
-            explanation = self._explain_anywhere(current) if joint is None else self._explain(current, joint)
+            explanation = (
+                self._explain_anywhere(current) if joint is None else self._explain(current, joint)
+            )
             if explanation.mistake is not None and explanation.joint is not None:
                 self.made.setdefault(explanation.joint, set()).add(explanation.mistake)
             yield explanation
@@ -122,7 +131,9 @@ class MistakeSearch:
 
         def leads_on(candidate: Explanation) -> bool:
             """Whether no joint up to this one is wrong any more."""
-            following = candidate.repaired.wrong_joint() if candidate.repaired is not None else joint
+            following = (
+                candidate.repaired.wrong_joint() if candidate.repaired is not None else joint
+            )
             return following is None or branch.rank(following) > branch.rank(joint)
 
         # Branches of one sheet have the same mistakes: those of an earlier branch are tried before all others.
@@ -137,7 +148,8 @@ class MistakeSearch:
         halves: list[Explanation] = []
         for other in branch.order[: branch.rank(joint) + 1]:
             halves += [
-                Explanation(mistake, other, repaired) for mistake, repaired in _lost_halves(branch, other, joint)
+                Explanation(mistake, other, repaired)
+                for mistake, repaired in _lost_halves(branch, other, joint)
             ]
 
         # A change that makes the whole branch right. If a change of this formula makes its values right, those of the
@@ -154,14 +166,24 @@ class MistakeSearch:
             return found
 
         # A frequent mistake that explains a good part of the failing poses.
-        frequent = [_edited(branch, joint, edit) for edit in self._edits(branch, joint) if edit.mistake in _FREQUENT]
+        frequent = [
+            _edited(branch, joint, edit)
+            for edit in self._edits(branch, joint)
+            if edit.mistake in _FREQUENT
+        ]
         best = max((*frequent, *halves), key=_count_of_closed, default=Explanation(None, joint))
         gained = _count_of_closed(best) - int(np.sum(branch.closed))
-        return best if gained > _MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
+        return (
+            best
+            if gained > _MIN_EXPLAINED_SHARE * np.sum(branch.failing)
+            else Explanation(None, joint)
+        )
 
     def _edits(self, branch: Branch, joint: int, mistakes: Collection[str] = ORDER) -> list[Edit]:
         """Return the changes of a joint's formula that correct some mistakes, as many as the remaining work allows."""
-        same_kind = [k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]]
+        same_kind = [
+            k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]
+        ]
         names = [f"q{k + 1}" for k in same_kind]
         offsets = _offsets(branch, joint)
         tree = branch.trees[joint]
@@ -173,7 +195,9 @@ class MistakeSearch:
         self.left -= len(changes) * size
         return changes
 
-    def _agreeing_edits(self, branch: Branch, joint: int, mistakes: Collection[str] = ORDER) -> list[Edit]:
+    def _agreeing_edits(
+        self, branch: Branch, joint: int, mistakes: Collection[str] = ORDER
+    ) -> list[Edit]:
         """Return the changes of a joint's formula that give a solution's values at poses that must be reached.
 
         If the changed part occurs more than once, it is changed in one place and then in all of them.
@@ -212,7 +236,9 @@ class MistakeSearch:
             return
         equal = equal_parts(branch.trees)
         for edit in agreeing:
-            trees = [replaced_everywhere(tree, equal[id(edit.old)], edit.new) for tree in branch.trees]
+            trees = [
+                replaced_everywhere(tree, equal[id(edit.old)], edit.new) for tree in branch.trees
+            ]
             if _count_of_changed(trees, branch.trees) > 1:
                 yield Explanation(edit.mistake, None, branch.with_trees(trees))
         for mistake, change in renamings(branch.trees, self.lengths):
@@ -236,7 +262,12 @@ def lengths_of(description: Description) -> Lengths:
     sizes = [abs(float(values[name])) for name in parameters]
 
     seen = {round(size, 12) for size in sizes} | {0.0}
-    for length in (*numbers.d, *numbers.a, *numbers.T_world_base[:3, 3], *numbers.T_last_tool[:3, 3]):
+    for length in (
+        *numbers.d,
+        *numbers.a,
+        *numbers.T_world_base[:3, 3],
+        *numbers.T_last_tool[:3, 3],
+    ):
         size = round(abs(float(length)), 12)
         if size not in seen:
             seen.add(size)

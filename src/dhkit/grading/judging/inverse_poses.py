@@ -80,7 +80,9 @@ class Poses:
     known: Array | None = None
 
     @classmethod
-    def random(cls, description: Description, samples: int, seed: int, *, whole_turns: bool = False) -> Poses:
+    def random(
+        cls, description: Description, samples: int, seed: int, *, whole_turns: bool = False
+    ) -> Poses:
         """Return the poses of random joint values in the ranges of :func:`_joint_ranges`.
 
         With ``whole_turns`` all angles are in [-pi, pi), whatever their limits.
@@ -125,7 +127,9 @@ class Poses:
         """Return the poses of some indices, shape (k,)."""
         index = np.asarray(chosen, dtype=int)
         known = None if self.known is None else self.known[index]
-        return replace(self, q=self.q[index], T=self.T[index], solutions=self.solutions[index], known=known)
+        return replace(
+            self, q=self.q[index], T=self.T[index], solutions=self.solutions[index], known=known
+        )
 
     def followed_by(self, other: Poses) -> Poses:
         """Return these poses and then those of another set of the same arm."""

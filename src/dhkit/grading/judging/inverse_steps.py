@@ -21,7 +21,14 @@ from dhkit.expressions.syntax import Name, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.catalogue import hint_of, sentence_of
-from dhkit.grading.grade_report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
+from dhkit.grading.grade_report import (
+    NO_STEP,
+    Diagnosis,
+    Entry,
+    KinematicJudgement,
+    Verdict,
+    entry_name,
+)
 from dhkit.grading.judging.changed_formulas import renamed, with_term
 from dhkit.grading.judging.inverse_poses import Poses
 from dhkit.grading.judging.step_context import Part, StepContext
@@ -30,7 +37,9 @@ from dhkit.grading.judging.step_solutions import Solutions
 from dhkit.grading.remarks import Note, NoteKind
 
 
-def _steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:
+def _steps_in_table_angles(
+    description: Description, steps: Sequence[GivenStep]
+) -> list[GivenStep] | None:
     """Return steps whose angles are the table's theta, joint value plus offset, in joint values; None if they agree."""
     offsets: dict[int, Tree] = {}
     for j, joint in enumerate(description.joints):
@@ -49,13 +58,20 @@ def _steps_in_table_angles(description: Description, steps: Sequence[GivenStep])
         solutions = [renamed(tree, change) for tree in step.solutions]
         if step.joint in offsets:
             solutions = [with_term(tree, False, offsets[step.joint]) for tree in solutions]
-        equations = tuple((renamed(left, change), renamed(right, change)) for left, right in step.equations)
+        equations = tuple(
+            (renamed(left, change), renamed(right, change)) for left, right in step.equations
+        )
         changed.append(replace(step, equations=equations, solutions=tuple(solutions)))
     return changed
 
 
 def judge_steps(
-    description: Description, steps: Sequence[GivenStep], samples: int = 500, seed: int = 0, *, explain: bool = True
+    description: Description,
+    steps: Sequence[GivenStep],
+    samples: int = 500,
+    seed: int = 0,
+    *,
+    explain: bool = True,
 ) -> KinematicJudgement:
     """Judge the steps of an arm's inverse kinematics, each with an entry of its own.
 
@@ -86,7 +102,9 @@ def judge_steps(
         judge = _Judge(description, poses, seed, explain)
         judged = judge.judgement(steps)
         in_table_angles = _steps_in_table_angles(description, steps)
-        if in_table_angles is None or all(entry.verdict is not Verdict.WRONG for entry in judged.entries):
+        if in_table_angles is None or all(
+            entry.verdict is not Verdict.WRONG for entry in judged.entries
+        ):
             return judged
         other = judge.judgement(in_table_angles)
 
@@ -137,7 +155,9 @@ class _Judge(StepContext):
             notes.append(Note(NoteKind.ASKED_FOR, "ik", self.poses.pose_parts))
         return KinematicJudgement(tuple(entries), tuple(diagnosis), tuple(notes))
 
-    def _step(self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int]) -> _JudgedStep:
+    def _step(
+        self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int]
+    ) -> _JudgedStep:
         """Return the judgement of step k, from 0.
 
         Parameters
@@ -153,7 +173,9 @@ class _Judge(StepContext):
         if step.error:
             if step.joint not in before:
                 self.solutions.skip(step.joint)
-            return _JudgedStep(Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], [])
+            return _JudgedStep(
+                Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], []
+            )
 
         parts: list[Part] = []
         notes: list[Note] = []
@@ -167,14 +189,18 @@ class _Judge(StepContext):
                 if part.verdict.passes:
                     # The task asks for the solution: an incomplete equation is then a remark.
                     incomplete = [one for one in parts if one.verdict is Verdict.INCOMPLETE]
-                    notes += [Note(NoteKind.STEP_REMARK, name, (one.statement,)) for one in incomplete]
+                    notes += [
+                        Note(NoteKind.STEP_REMARK, name, (one.statement,)) for one in incomplete
+                    ]
                     parts = [one for one in parts if one not in incomplete]
                 parts.append(part)
                 if roots is not None and roots[0] < roots[1]:
                     notes.append(Note(NoteKind.ROOTS_MISSING, name, (str(roots[0]), str(roots[1]))))
         except AnswerError as error:
             self.solutions.skip(step.joint)
-            return _JudgedStep(Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=str(error)), [], [])
+            return _JudgedStep(
+                Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=str(error)), [], []
+            )
         notes += [Note(NoteKind.STEP_REMARK, name, (one.remark,)) for one in parts if one.remark]
 
         worst = max(parts, key=lambda part: part.verdict.severity)
@@ -185,7 +211,11 @@ class _Judge(StepContext):
             verb = "is" if len(follows) == 1 else "are"
             statement += f"; right in terms of {', '.join(follows)}, which {verb} wrong"
 
-        found = [self._diagnosis(k, step, part) for part in parts if not part.verdict.passes and part.mistakes]
+        found = [
+            self._diagnosis(k, step, part)
+            for part in parts
+            if not part.verdict.passes and part.mistakes
+        ]
         difference = next((part.difference for part in parts if part.difference), None)
         witness = next((part.witness for part in parts if part.witness), None)
         read, latex = step.read_as

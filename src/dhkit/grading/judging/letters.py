@@ -84,7 +84,11 @@ class WrittenNumbers:
         return {name: exact_number(description, name) for name in missing}
 
     def _left_out(
-        self, remaining: Element, right: Element, letters: frozenset[str], values: Mapping[str, Fraction]
+        self,
+        remaining: Element,
+        right: Element,
+        letters: frozenset[str],
+        values: Mapping[str, Fraction],
     ) -> frozenset[str]:
         """Return the letters that the right value has in a term which remains where no number is written.
 
@@ -106,7 +110,11 @@ class WrittenNumbers:
         own = remaining.terms
         known = without.terms
         of_letters = (in_numbers - without).terms
-        terms = [monomial for monomial in of_letters if own.get(monomial, 0) not in (0, known.get(monomial, 0))]
+        terms = [
+            monomial
+            for monomial in of_letters
+            if own.get(monomial, 0) not in (0, known.get(monomial, 0))
+        ]
 
         found = set()
         for letter in letters:
@@ -116,11 +124,17 @@ class WrittenNumbers:
         return frozenset(found)
 
     def _with(
-        self, right: Element, letters: Collection[str], values: Mapping[str, Fraction], zeros: Collection[str] = ()
+        self,
+        right: Element,
+        letters: Collection[str],
+        values: Mapping[str, Fraction],
+        zeros: Collection[str] = (),
     ) -> Element:
         """Return an element with their values for letters, and 0 for those in ``zeros``."""
         ring = self.truth.arm(self.quantity).ring
-        numbers = {name: ring.zero if name in zeros else ring.number(values[name]) for name in letters}
+        numbers = {
+            name: ring.zero if name in zeros else ring.number(values[name]) for name in letters
+        }
         return substituted(element_array([right]), numbers, ring)[0]  # type: ignore[no-any-return]
 
 

@@ -91,7 +91,9 @@ class Evaluation(Algebra[Any]):
             An unknown function.
         """
         if tree.function not in self.functions:
-            raise AnswerError(f"unknown function {tree.function!r}; known are {', '.join(self.functions)}")
+            raise AnswerError(
+                f"unknown function {tree.function!r}; known are {', '.join(self.functions)}"
+            )
         return self.functions[tree.function](*map(self.of, tree.arguments))
 
     def power(self, tree: Power) -> Any:

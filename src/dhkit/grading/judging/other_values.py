@@ -93,7 +93,11 @@ def with_other_values(description: Description, trees: Sequence[Tree], seed: int
             # It may be made of letters that the formulas do not have: these keep their values.
             kept |= {name for name in parameters if name not in used}
     varied = letters.keys() - kept
-    at_values = {name: letters[name] for name in kept | _names_of_all(in_letters.values()) if name not in used}
+    at_values = {
+        name: letters[name]
+        for name in kept | _names_of_all(in_letters.values())
+        if name not in used
+    }
 
     # The arm at other values.
     rng = np.random.default_rng(seed)
@@ -101,7 +105,9 @@ def with_other_values(description: Description, trees: Sequence[Tree], seed: int
     for name in sorted(varied):
         values[name] = round(letters[name] * float(rng.uniform(_MIN_FACTOR, _MAX_FACTOR)), 6)
     try:
-        other = with_parameters(description, **{name: x for name, x in values.items() if name in parameters})
+        other = with_parameters(
+            description, **{name: x for name, x in values.items() if name in parameters}
+        )
         lengths = {name: Fraction(str(x)) for name, x in values.items() if name in table}
         other = with_table_lengths(other, lengths)
     except DescriptionError:
@@ -141,7 +147,9 @@ def _kinematic_parameters(description: Description) -> list[str]:
 
 def _is_value(part: Number) -> bool:
     """Whether a number may be a length: a decimal, not a factor such as 2 or 1/2."""
-    is_pure = part.value.denominator <= _MAX_PURE_NUMBER and abs(part.value.numerator) <= _MAX_PURE_NUMBER
+    is_pure = (
+        part.value.denominator <= _MAX_PURE_NUMBER and abs(part.value.numerator) <= _MAX_PURE_NUMBER
+    )
     return "." in part.text or not is_pure
 
 
@@ -153,7 +161,9 @@ def _names_of_all(trees: Iterable[Tree]) -> frozenset[str]:
 def _letters_of(number: float, letters: Mapping[str, float]) -> list[Tree]:
     """Return the simplest formulas of letters that have a number as their value: l, l^2, 2 l, else l m and 2 l m."""
     for formulas in (_powers(letters), _products(letters)):
-        found = [tree for value, tree in formulas if abs(value - number) <= _SAME_VALUE * abs(value)]
+        found = [
+            tree for value, tree in formulas if abs(value - number) <= _SAME_VALUE * abs(value)
+        ]
         if found:
             return found
     return []

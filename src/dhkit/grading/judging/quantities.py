@@ -65,12 +65,18 @@ class JudgedQuantity:
     @property
     def wrong_indices(self) -> list[Index]:
         """Indices of the wrong entries."""
-        return [index for index, finding in self.findings.items() if finding.verdict is Verdict.WRONG]
+        return [
+            index for index, finding in self.findings.items() if finding.verdict is Verdict.WRONG
+        ]
 
     @property
     def is_zero(self) -> bool:
         """Whether everything that was handed in is zero."""
-        findings = [finding for finding in self.findings.values() if finding.verdict is not Verdict.INCOMPLETE]
+        findings = [
+            finding
+            for finding in self.findings.values()
+            if finding.verdict is not Verdict.INCOMPLETE
+        ]
         answers = [finding.answer.element() if finding.answer else None for finding in findings]
         return bool(answers) and all(answer is not None and answer.is_zero for answer in answers)
 
@@ -151,12 +157,21 @@ def judge_quantity(
     right = truth.of("h" if name == "C" else name)
     reader = truth.reader(name)
     up_to_constant = None if name == "L" and task.total_derivative else name in ("V", "L")
-    by = Comparison(arm, reader, digits, residuals=_residuals(name, task), seed=seed, up_to_constant=up_to_constant)
+    by = Comparison(
+        arm,
+        reader,
+        digits,
+        residuals=_residuals(name, task),
+        seed=seed,
+        up_to_constant=up_to_constant,
+    )
     judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth), right)
     if judged.wrong and not judged.is_zero:
         judged = _in_written_numbers(judged, truth, by, letters)
     if task.in_letters and judged.numbers:
-        judged = replace(judged, findings={index: _in_numbers(found) for index, found in judged.findings.items()})
+        judged = replace(
+            judged, findings={index: _in_numbers(found) for index, found in judged.findings.items()}
+        )
     contradictions = tuple(entry.index for entry in given if _contradicts(entry, judged, by))
     return replace(judged, contradictions=contradictions)
 
@@ -203,7 +218,11 @@ def _in_written_numbers(
     numbers: dict[Index, frozenset[str]] = {}
     for place, tree in _wrong_trees(judged, truth).items():
         right = judged.truth[place]
-        found = written.letters(tree, right) if letters else parameters_in(element_array([right]), truth)
+        found = (
+            written.letters(tree, right)
+            if letters
+            else parameters_in(element_array([right]), truth)
+        )
         if found:
             numbers[place] = found
             in_numbers[place] = truth.with_numbers(judged.name, element_array([right]), found)[0]
@@ -219,7 +238,9 @@ def _in_written_numbers(
         for entry in judged.given:
             if entry.index in numbers:
                 by_numbers = replace(by, numbers=numbers[entry.index])
-                findings[entry.index] = _finding(entry.tree, entry.error, in_numbers[entry.index], by_numbers)
+                findings[entry.index] = _finding(
+                    entry.tree, entry.error, in_numbers[entry.index], by_numbers
+                )
     other = replace(judged, findings=findings, truth=in_numbers, numbers=every)
     if letters and not other.wrong < judged.wrong:
         return judged
@@ -235,7 +256,11 @@ def _wrong_trees(judged: JudgedQuantity, truth: Truth) -> dict[Index, Tree]:
     trees: dict[Index, Tree] = {}
     for index in judged.wrong_indices:
         place = place_of(judged.name, index)
-        entries = [entry for entry in judged.given if place_of(judged.name, entry.index) == place and entry.tree]
+        entries = [
+            entry
+            for entry in judged.given
+            if place_of(judged.name, entry.index) == place and entry.tree
+        ]
         if judged.name == "C":
             trees[place] = _row_times_rates(entries, truth.coordinates)
         elif entries and entries[0].tree is not None:
@@ -258,10 +283,14 @@ def parameters_in(array: Elements, truth: Truth) -> frozenset[str]:
     return frozenset().union(*map(names_in, array.flat)) & frozenset(truth.description.parameters)
 
 
-def _findings(name: str, given: Sequence[Given], right: Elements, by: Comparison, truth: Truth) -> dict[Index, Finding]:
+def _findings(
+    name: str, given: Sequence[Given], right: Elements, by: Comparison, truth: Truth
+) -> dict[Index, Finding]:
     if name == "C":
         return _row_findings(given, right, by, truth)
-    return {entry.index: _finding(entry.tree, entry.error, right[entry.index], by) for entry in given}
+    return {
+        entry.index: _finding(entry.tree, entry.error, right[entry.index], by) for entry in given
+    }
 
 
 def _finding(tree: Tree | None, error: str, right: Element, by: Comparison) -> Finding:
@@ -273,7 +302,9 @@ def _finding(tree: Tree | None, error: str, right: Element, by: Comparison) -> F
         return Finding(Verdict.UNREADABLE, str(refusal))
 
 
-def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth: Truth) -> dict[Index, Finding]:
+def _row_findings(
+    given: Sequence[Given], right: Elements, by: Comparison, truth: Truth
+) -> dict[Index, Finding]:
     """Return the findings on C, which is judged by C qd: the entries of a row share that on the row of C qd."""
     findings: dict[Index, Finding] = {}
     for i in range(len(right)):
@@ -294,7 +325,9 @@ def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth
     return findings
 
 
-def _judge_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth: Truth) -> dict[Index, Finding]:
+def _judge_wrong_row(
+    row: Sequence[Given], wrong: Finding, by: Comparison, truth: Truth
+) -> dict[Index, Finding]:
     """Return the right entries of a wrong row of C: those of the Christoffel factorization.
 
     Zeros are right only beside other entries: a row of zeros is a row that was left out.
@@ -306,7 +339,11 @@ def _judge_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth
         if finding.verdict is Verdict.CORRECT:
             alike.append(entry)
     answer = wrong.answer.element() if wrong.answer is not None else None
-    if answer is not None and answer.is_zero and not any(christoffel[entry.index] for entry in alike):
+    if (
+        answer is not None
+        and answer.is_zero
+        and not any(christoffel[entry.index] for entry in alike)
+    ):
         return {}
     statement = "proved equal to the Christoffel symbols' entry; another entry of its row is wrong"
     right = replace(wrong, verdict=Verdict.CORRECT, statement=statement, witness=None)
@@ -319,12 +356,17 @@ def _judge_partial_row(row: Sequence[Given], by: Comparison, truth: Truth) -> di
     Another factorization may be right too, but only the whole row could show it.
     """
     christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
-    lacking = ", ".join(f"C{entry.index[0] + 1}{entry.index[1] + 1}" for entry in row if entry.is_missing)
+    lacking = ", ".join(
+        f"C{entry.index[0] + 1}{entry.index[1] + 1}" for entry in row if entry.is_missing
+    )
     findings: dict[Index, Finding] = {}
     for entry in row:
         finding = _finding(entry.tree, entry.error, christoffel[entry.index], by)
         if finding.verdict is Verdict.WRONG:
-            finding = Finding(Verdict.INCOMPLETE, f"not judged: C is judged by rows of C qd, and {lacking} is missing")
+            finding = Finding(
+                Verdict.INCOMPLETE,
+                f"not judged: C is judged by rows of C qd, and {lacking} is missing",
+            )
         findings[entry.index] = finding
     return findings
 
@@ -372,7 +414,9 @@ def _euler_lagrange(answer: Quotient, truth: Element) -> Sequence[Element]:
     if element is None or _accelerates(element):
         return _slopes(answer, truth)
     difference = element - truth
-    return [difference.by_rate(i).by_time() - difference.by_position(i) for i in range(truth.ring.n)]
+    return [
+        difference.by_rate(i).by_time() - difference.by_position(i) for i in range(truth.ring.n)
+    ]
 
 
 def _accelerates(element: Element) -> bool:

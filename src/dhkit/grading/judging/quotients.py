@@ -58,7 +58,9 @@ class Quotient:
         if self.is_polynomial:
             return self.numerator
         ring = self.numerator.ring
-        polynomial = ring.polynomials.quotient(self.numerator.polynomial, self.denominator.polynomial)
+        polynomial = ring.polynomials.quotient(
+            self.numerator.polynomial, self.denominator.polynomial
+        )
         return None if polynomial is None else Element(ring, polynomial).reduced()
 
 
@@ -77,7 +79,10 @@ class RingReader(Algebra[Quotient]):
     """
 
     def __init__(
-        self, ring: Ring, angle_factor: Fraction | None = None, numbers: Mapping[str, Fraction] | None = None
+        self,
+        ring: Ring,
+        angle_factor: Fraction | None = None,
+        numbers: Mapping[str, Fraction] | None = None,
     ) -> None:
         super().__init__()
         self.ring = ring
@@ -181,7 +186,9 @@ class RingReader(Algebra[Quotient]):
 
             if k % _CHECK_INTERVAL == 0 or k == len(terms):
                 total = self.ring.sum([polynomials.numerator, *pending])
-                polynomials = self._bound_coefficients(Quotient(total, one, polynomials.bits + pending_bits))
+                polynomials = self._bound_coefficients(
+                    Quotient(total, one, polynomials.bits + pending_bits)
+                )
                 pending = []
                 pending_bits = 0
 
@@ -189,7 +196,9 @@ class RingReader(Algebra[Quotient]):
             return polynomials
 
         # p + N / D = (N + p D) / D
-        numerator = fractions.numerator + self._multiply(polynomials.numerator, fractions.denominator)
+        numerator = fractions.numerator + self._multiply(
+            polynomials.numerator, fractions.denominator
+        )
         bits = fractions.bits + polynomials.bits
         return self._bound_coefficients(Quotient(numerator, fractions.denominator, bits))
 
@@ -198,7 +207,9 @@ class RingReader(Algebra[Quotient]):
         if a.denominator.polynomial == b.denominator.polynomial:
             return Quotient(a.numerator + b.numerator, a.denominator, bits)
         # N_a / D_a + N_b / D_b = (N_a D_b + N_b D_a) / (D_a D_b)
-        numerator = self._multiply(a.numerator, b.denominator) + self._multiply(b.numerator, a.denominator)
+        numerator = self._multiply(a.numerator, b.denominator) + self._multiply(
+            b.numerator, a.denominator
+        )
         denominator = self._multiply(a.denominator, b.denominator)
         return self._bound_coefficients(Quotient(numerator, denominator, bits))
 
@@ -244,7 +255,9 @@ class RingReader(Algebra[Quotient]):
         # measured (a quotient said to be beyond the bound is) before the power is refused. Up to four times the bound
         # the power is multiplied out all the same, and its own coefficients are measured below.
         if quotient.bits * power > BOUNDS.coefficient_bits:
-            unmeasured = Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
+            unmeasured = Quotient(
+                quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1
+            )
             quotient = self._bound_coefficients(unmeasured)
             if quotient.bits * power > 4 * BOUNDS.coefficient_bits:
                 raise OutsideTheRingError(_NUMBER_TOO_LONG)
@@ -323,7 +336,9 @@ class RingReader(Algebra[Quotient]):
         if number is None or number.denominator != 1:
             raise OutsideTheRingError("an exponent that is not a whole number")
         if abs(number) > BOUNDS.exponent:
-            raise OutsideTheRingError(f"an exponent of {str(number)[:20]}, beyond {BOUNDS.exponent}")
+            raise OutsideTheRingError(
+                f"an exponent of {str(number)[:20]}, beyond {BOUNDS.exponent}"
+            )
         return int(number)
 
     def _call(self, function: str, arguments: tuple[Tree, ...]) -> Quotient:
@@ -340,7 +355,9 @@ class RingReader(Algebra[Quotient]):
                 # Such a function of numbers and parameters is a constant that the ring may have.
                 try:
                     with Budget():
-                        expression = value_of(Call(function, arguments, 0), [*self._constants, *self._names])
+                        expression = value_of(
+                            Call(function, arguments, 0), [*self._constants, *self._names]
+                        )
                     return self._polynomial(self.ring.read(expression))
                 except (ExpressionError, RingError):
                     pass
@@ -411,7 +428,9 @@ class RingReader(Algebra[Quotient]):
         if times.denominator != 1:
             raise OutsideTheRingError(f"an angle of {times} q{i + 1}")
         if abs(times) > BOUNDS.exponent:
-            raise OutsideTheRingError(f"an angle of {str(times)[:20]} q{i + 1}, beyond {BOUNDS.exponent} times")
+            raise OutsideTheRingError(
+                f"an angle of {str(times)[:20]} q{i + 1}, beyond {BOUNDS.exponent} times"
+            )
 
         single = (self.ring.cosine(i), self.ring.sine(i))
         total = (self.ring.one, self.ring.zero)
@@ -457,12 +476,16 @@ def sum_of_angles(ring: Ring, directions: Iterable[Direction]) -> Direction:
 def varying(element: Element) -> Element:
     """Return an element without its terms that do not depend on the state."""
     ring = element.ring
-    of_state = [place for place, generator in enumerate(ring.generators) if generator.kind != "constant"]
+    of_state = [
+        place for place, generator in enumerate(ring.generators) if generator.kind != "constant"
+    ]
 
     def varies(monomial: Monomial) -> bool:
         return any(monomial[place] for place in of_state)
 
-    return ring.from_terms({monomial: c for monomial, c in element.terms.items() if varies(monomial)})
+    return ring.from_terms(
+        {monomial: c for monomial, c in element.terms.items() if varies(monomial)}
+    )
 
 
 def _rational(element: Element) -> Fraction | None:
@@ -475,4 +498,7 @@ def _rational(element: Element) -> Fraction | None:
 
 def _bits(element: Element) -> int:
     """Return the size of the longest coefficient, numerator and denominator together, in bits; 1 for zero."""
-    return max((c.numerator.bit_length() + c.denominator.bit_length() for c in element.terms.values()), default=1)
+    return max(
+        (c.numerator.bit_length() + c.denominator.bit_length() for c in element.terms.values()),
+        default=1,
+    )

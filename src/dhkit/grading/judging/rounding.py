@@ -254,7 +254,9 @@ class _Expansion(Algebra[_Ratio]):
                 if not value:
                     continue
                 m = _product_of_monomials(a, b)
-                contribution = _Coefficient.of(value, max(x.share, y.share), x.is_printed or y.is_printed)
+                contribution = _Coefficient.of(
+                    value, max(x.share, y.share), x.is_printed or y.is_printed
+                )
                 product[m] = product[m] + contribution if m in product else contribution
         return product
 
@@ -280,10 +282,14 @@ def _product_of_monomials(a: _Monomial, b: _Monomial) -> _Monomial:
 def has_decimals(tree: Tree, digits: int) -> bool:
     """Whether an answer has a decimal of at least so many significant digits outside angles and exponents."""
     parts = parts_of(tree, coefficients=True)
-    return any(isinstance(part, Number) and _allowance(part.value, part.text, digits) for part in parts)
+    return any(
+        isinstance(part, Number) and _allowance(part.value, part.text, digits) for part in parts
+    )
 
 
-def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Residuals, digits: int) -> float | None:
+def rounding_share(
+    tree: Tree, truth: Element, reader: RingReader, residuals: Residuals, digits: int
+) -> float | None:
     """Return the smallest share of their allowances by which coefficients have to change to make an answer the truth.
 
     Parameters
@@ -369,12 +375,16 @@ def _groups(element: Element) -> dict[Any, list[Fraction]]:
     is_beside = [generator.kind not in ("sine", "cosine") for generator in element.ring.generators]
     groups: dict[Any, list[Fraction]] = {}
     for (_, monomial), coefficient in _coefficients([element], element.ring).items():
-        group = tuple(exponent for exponent, beside in zip(monomial, is_beside, strict=True) if beside)
+        group = tuple(
+            exponent for exponent, beside in zip(monomial, is_beside, strict=True) if beside
+        )
         groups.setdefault(group, []).append(abs(coefficient))
     return groups
 
 
-def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Fraction], is_energy: bool) -> bool:
+def _is_small(
+    difference: Element, reference: Element, shares: Mapping[Any, Fraction], is_energy: bool
+) -> bool:
     """Whether a difference is within the coarsest decimals' allowance of the truth's own coefficients.
 
     An energy's terms that do not depend on the state are left out: energies count from any zero.
@@ -429,7 +439,9 @@ def _coefficients(residuals: Sequence[Element], ring: PolynomialRing) -> _Coeffi
                 coefficient *= number ** monomial[place]
             rest = monomial
             if numbers:
-                rest = tuple(0 if place in numbers else exponent for place, exponent in enumerate(monomial))
+                rest = tuple(
+                    0 if place in numbers else exponent for place, exponent in enumerate(monomial)
+                )
             sums[k, rest] = sums.get((k, rest), Fraction(0)) + coefficient
     return {place: value for place, value in sums.items() if value}
 
@@ -443,7 +455,9 @@ def _numbers(ring: PolynomialRing) -> dict[int, Fraction]:
     }
 
 
-def _least_share(unchanged: _Coefficients, columns: Sequence[_Coefficients], noise: Fraction) -> float | None:
+def _least_share(
+    unchanged: _Coefficients, columns: Sequence[_Coefficients], noise: Fraction
+) -> float | None:
     """Return the smallest possible maximum of |x_j| with b + A x = 0; None if there is no such x.
 
     Parameters
@@ -471,12 +485,16 @@ def _least_share(unchanged: _Coefficients, columns: Sequence[_Coefficients], noi
     # Each row has one unknown, and each unknown one row: x_j = -b_j / A_jj.
     is_diagonal = all(len(column) == 1 for column in columns) and len(scales) == len(columns)
     if is_diagonal:
-        shares = [float(abs(unchanged.get(place, Fraction(0))) / scale) for place, scale in scales.items()]
+        shares = [
+            float(abs(unchanged.get(place, Fraction(0))) / scale) for place, scale in scales.items()
+        ]
         return max(shares, default=0.0)
     return _solve(unchanged, columns, scales)
 
 
-def _solve(unchanged: _Coefficients, columns: Sequence[_Coefficients], scales: Mapping[Any, Fraction]) -> float | None:
+def _solve(
+    unchanged: _Coefficients, columns: Sequence[_Coefficients], scales: Mapping[Any, Fraction]
+) -> float | None:
     """Return the smallest s of a linear program: minimise s subject to A x = -b and -s <= x_j <= s; None without x."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_array, eye_array, hstack, vstack

@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Convention
-from dhkit.grading.judging.frame_changes import SAME, FrameChange, frame_changes, joint_changes, wrapped
+from dhkit.grading.judging.frame_changes import (
+    SAME,
+    FrameChange,
+    frame_changes,
+    joint_changes,
+    wrapped,
+)
 from dhkit.grading.judging.table_arms import TableArm
 
 _MAX_STEPS = 12
@@ -108,7 +114,11 @@ class Overlay:
     def moves_zero(self) -> bool:
         """Whether a joint variable has another zero or the opposite sense."""
         for sense, offset, kind in zip(self.senses, self.offsets, self.truth.kinds, strict=True):
-            is_moved = abs(wrapped(offset)) > SAME if kind == "R" else abs(offset) > SAME * self.truth.scale
+            is_moved = (
+                abs(wrapped(offset)) > SAME
+                if kind == "R"
+                else abs(offset) > SAME * self.truth.scale
+            )
             if sense < 0 or is_moved:
                 return True
         return False
@@ -190,7 +200,10 @@ class _Matching:
     @property
     def links_agree(self) -> bool:
         """Whether neighbouring axes have the same angle and common normal in both arms, whatever the senses."""
-        invariants = [_invariants(arm.screws(np.zeros(arm.n), self.scale)) for arm in (self.answer, self.truth)]
+        invariants = [
+            _invariants(arm.screws(np.zeros(arm.n), self.scale))
+            for arm in (self.answer, self.truth)
+        ]
         return bool(np.max(np.abs(invariants[0] - invariants[1]), initial=0.0) < SAME)
 
     def solutions(self, match: _Match) -> Iterator[_Match]:
@@ -284,7 +297,9 @@ class _Matching:
             target = self.truth.screws(offsets, self.scale)
             moved = self.own @ _adjoint(B, self.scale).T
             given = _scaled(np.array([B, B @ frame_n]), self.scale)
-            wanted = _scaled(np.array([square_0, self.truth.frames(offsets)[-1] @ square_n]), self.scale)
+            wanted = _scaled(
+                np.array([square_0, self.truth.frames(offsets)[-1] @ square_n]), self.scale
+            )
             gap = np.concatenate([(moved - senses * target).ravel(), (given - wanted).ravel()])
             if np.max(np.abs(gap)) < SAME / 100:
                 return replace(overlay, B=B, offsets=offsets)
@@ -294,7 +309,9 @@ class _Matching:
             ends_by_motion = np.array([_rate(unit) @ given for unit in np.eye(6)])
             # Along joint j:      d(T of frame n) = S_j^ T, and frame 0 stays
             axes_by_joints = -_brackets(target, target) * carried
-            ends_by_joints = np.array([[0 * wanted[1], -_rate(screw) @ wanted[1]] for screw in target])
+            ends_by_joints = np.array(
+                [[0 * wanted[1], -_rate(screw) @ wanted[1]] for screw in target]
+            )
             ends_by_joints = ends_by_joints * is_free[:, None, None, None]
 
             by_motion = np.hstack([axes_by_motion.reshape(6, -1), ends_by_motion.reshape(6, -1)])
@@ -306,7 +323,9 @@ class _Matching:
         return None
 
 
-def _newton_step(columns: NDArray[np.floating[Any]], gap: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+def _newton_step(
+    columns: NDArray[np.floating[Any]], gap: NDArray[np.floating[Any]]
+) -> NDArray[np.floating[Any]]:
     """Return the least-squares step x of gap + J x = 0, shape (k,), none of its entries larger than 1.5.
 
     ``columns`` are those of J as rows, shape (k, len(gap)). A step of 1.5 rad, or 1.5 times the scale, stays in the
@@ -417,7 +436,9 @@ def _invariants(screws: Array) -> Array:
     are_revolute = np.any(z1, axis=1) & np.any(z2, axis=1)
     are_parallel = are_revolute & (np.abs(np.abs(cosine) - 1) < SAME)
     distance = np.linalg.norm(m2 * np.sign(cosine)[:, None] - m1, axis=1)
-    return np.stack([np.abs(cosine), np.abs(reciprocal), np.where(are_parallel, distance, 0)], axis=1)
+    return np.stack(
+        [np.abs(cosine), np.abs(reciprocal), np.where(are_parallel, distance, 0)], axis=1
+    )
 
 
 def _brackets(first: Array, second: Array) -> Array:

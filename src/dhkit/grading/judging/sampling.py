@@ -76,11 +76,15 @@ def samples(
         shares = (rng.permutation(sets) + rng.uniform(size=sets)) / sets
         factors[name] = 4.0 ** (2 * shares - 1)
 
-    parameters: dict[str, Any] = {name: mpmath.mpf(value) for name, value in arm.description.numbers.values.items()}
+    parameters: dict[str, Any] = {
+        name: mpmath.mpf(value) for name, value in arm.description.numbers.values.items()
+    }
     for k in range(count):
         if k % every == 0:
             for name, value in arm.parameters.items():
-                parameters[name] = mpmath.mpf(value if name in numbers else value * factors[name][k // every])
+                parameters[name] = mpmath.mpf(
+                    value if name in numbers else value * factors[name][k // every]
+                )
         names = dict(parameters)
         # In turn: within one turn, at one scale that all joints share, at scales of their own.
         common = 10.0 ** rng.uniform(-3.0, 3.0)
@@ -98,7 +102,9 @@ def element_value(element: Element, sample: Sample) -> mpf:
     return _sum_of_products(terms, sample.generators.__getitem__)
 
 
-def _sum_of_products(terms: Iterable[tuple[Iterable[tuple[_Key, int]], Fraction]], value: Callable[[_Key], Any]) -> mpf:
+def _sum_of_products(
+    terms: Iterable[tuple[Iterable[tuple[_Key, int]], Fraction]], value: Callable[[_Key], Any]
+) -> mpf:
     """Return the sum over terms of coefficient c times powers: sum of c x_1^e_1 x_2^e_2 ..."""
     import mpmath
 

@@ -73,7 +73,10 @@ class StepContext:
     def derived(self, joint: int) -> DerivedStep | None:
         """Return the derivation's step for a joint, from 0; None without a derivation."""
         steps = self.derivation.steps if self.derivation is not None else ()
-        return next((step for step in steps if step.unknown is not None and step.unknown.joint == joint), None)
+        return next(
+            (step for step in steps if step.unknown is not None and step.unknown.joint == joint),
+            None,
+        )
 
     def lengths(self, trees: Sequence[Tree]) -> Lengths:
         """Return the lengths that formulas may contain, with the names d1, a1 ... if the formulas use such names.
@@ -96,7 +99,9 @@ class StepContext:
         # Then those of base and tool that equal none of them.
         others = [not np.any(np.isclose(value, sizes, rtol=_SAME_LENGTH)) for value in every.values]
         formulas += [tree for tree, is_other in zip(every.trees, others, strict=True) if is_other]
-        other_sizes = [value for value, is_other in zip(every.values, others, strict=True) if is_other]
+        other_sizes = [
+            value for value, is_other in zip(every.values, others, strict=True) if is_other
+        ]
         return Lengths(tuple(named), tuple(formulas), (*sizes, *other_sizes), every.of_tool)
 
     @cached_property
@@ -120,7 +125,9 @@ class StepContext:
         count = len(inside.q)
         if not inside.has_closed_form:
             return inside, np.ones(count, dtype=bool)
-        every = inside.followed_by(Poses.random(self.description, count, self.seed, whole_turns=True))
+        every = inside.followed_by(
+            Poses.random(self.description, count, self.seed, whole_turns=True)
+        )
         found = np.sum(np.all(np.isfinite(every.solutions), axis=-1), axis=1)
         rows = np.flatnonzero(found == found.max())
         return every.at(rows), rows < count
@@ -140,7 +147,10 @@ class StepContext:
         if has_base:
             yield "base_not_taken_off", replace(poses, T=T_base_world @ poses.T).values
         if has_base and has_tool:
-            yield "base_and_tool_not_taken_off", replace(poses, T=T_base_world @ poses.T @ T_tool_last).values
+            yield (
+                "base_and_tool_not_taken_off",
+                replace(poses, T=T_base_world @ poses.T @ T_tool_last).values,
+            )
 
     @cached_property
     def chains(self) -> tuple[ExactChain, ExactChain]:

@@ -113,16 +113,23 @@ class Equations:
                     return self._wrong(k, tree, difference)
                 found = Verdict.UNDECIDED
                 statement = "true of one of the joint's roots; tried, not proved"
-                remarks.append(f"the equation is true of one root alone, at {share:.3g} % of the poses tried")
+                remarks.append(
+                    f"the equation is true of one root alone, at {share:.3g} % of the poses tried"
+                )
             elif statement == _WITH_NUMBERS and self._is_in_names(tree):
-                remarks.append("the equation is true of this arm alone: it needs lengths that are equal, or zero, here")
+                remarks.append(
+                    "the equation is true of this arm alone: it needs lengths that are equal, or zero, here"
+                )
             statements.append(statement)
             verdict = max(verdict, found, key=lambda one: one.severity)
 
         # Do they determine the joint together?
         own = f"q{self.step.joint + 1}"
         if all(self._holds_always(tree) for tree in self.differences):
-            return Part(Verdict.INCOMPLETE, "the equation holds for every pose and all joint values: it says nothing")
+            return Part(
+                Verdict.INCOMPLETE,
+                "the equation holds for every pose and all joint values: it says nothing",
+            )
         used = set().union(*map(names_of, self.differences))
         if own not in used:
             return Part(Verdict.INCOMPLETE, f"the equation is right, but does not contain {own}")
@@ -130,7 +137,9 @@ class Equations:
             later = sorted(used & joints - {own} - {f"q{j + 1}" for j in self.before})
             verb = "is" if len(later) == 1 else "are"
             reason = f", as {', '.join(later)} {verb} not known yet" if later else ""
-            return Part(Verdict.INCOMPLETE, f"the equation is right, but does not determine {own}{reason}")
+            return Part(
+                Verdict.INCOMPLETE, f"the equation is right, but does not determine {own}{reason}"
+            )
         root = self._other_root(used)
         if root is not None:
             return Part(
@@ -233,7 +242,9 @@ class Equations:
         used: set[int] = set()
         for monomial in numerator.terms:
             used.update(place for place, exponent in enumerate(monomial) if exponent)
-        return translated(numerator, chain.ring, {place: pose[place] for place in used & pose.keys()})
+        return translated(
+            numerator, chain.ring, {place: pose[place] for place in used & pose.keys()}
+        )
 
     @property
     def _values(self) -> dict[str, Array | float]:
@@ -246,8 +257,12 @@ class Equations:
         The values of names are those at the random poses unless given.
         """
         given = self._values if values is None else values
-        relative = np.asarray(doubles(tree, given)) / np.maximum(_sizes(tree, given), _SMALLEST_SIZE)
-        residual: Array = np.broadcast_to(np.nan_to_num(relative, nan=np.inf), np.shape(given["px"]))
+        relative = np.asarray(doubles(tree, given)) / np.maximum(
+            _sizes(tree, given), _SMALLEST_SIZE
+        )
+        residual: Array = np.broadcast_to(
+            np.nan_to_num(relative, nan=np.inf), np.shape(given["px"])
+        )
         return residual
 
     def _holds_always(self, tree: Tree) -> bool:
@@ -284,7 +299,11 @@ class Equations:
     def _is_in_names(self, tree: Tree) -> bool:
         """Whether an equation has lengths by name, and no number that may stand for one."""
         lengths = {*table_lengths(self.context.description), *self.context.description.parameters}
-        numbers = [part for part in parts_of(tree) if isinstance(part, Number) and part.value.denominator != 1]
+        numbers = [
+            part
+            for part in parts_of(tree)
+            if isinstance(part, Number) and part.value.denominator != 1
+        ]
         return bool(names_of(tree) & lengths) and not numbers
 
     def _determines(self) -> bool:
@@ -333,7 +352,12 @@ class Equations:
         state |= {f"q{i + 1}": float(x) for i, x in enumerate(self.context.poses.q[s])}
         witness = Witness(state, finite_at_s(left), finite_at_s(right))
         subject = f"equation {k + 1}" if len(self.differences) > 1 else "equation"
-        part = Part(Verdict.WRONG, f"{subject}: no identity of the arm", difference=difference, witness=witness)
+        part = Part(
+            Verdict.WRONG,
+            f"{subject}: no identity of the arm",
+            difference=difference,
+            witness=witness,
+        )
         if self.context.explain:
             part.mistakes = [self._mistake(tree) or ("equation_wrong", "")]
         return part
@@ -379,7 +403,11 @@ class Equations:
         lengths = self.context.lengths([tree])
         size = np.max(np.abs(np.asarray(formula.numbers))) + self.context.poses.scale
         own = self.step.joint
-        edits = [*_with_a_length(tree, lengths, own), *_inner_angles(tree, own), *edits_of_parts(tree, lengths)]
+        edits = [
+            *_with_a_length(tree, lengths, own),
+            *_inner_angles(tree, own),
+            *edits_of_parts(tree, lengths),
+        ]
         for edit in edits:
             if edit.old is tree and edit.mistake in _OF_BOTH_SIDES:
                 continue
@@ -413,7 +441,11 @@ class _EquationsAtPoses:
     def values(self, rows: NDArray[np.intp], q: Array) -> dict[str, Array | float]:
         """Return the values of names at poses of some indices (k,) with joint values (k, n), rad and m."""
         count = len(self.poses.q)
-        pose = {name: np.broadcast_to(x, count)[rows] for name, x in self.poses.values.items() if name in self.used}
+        pose = {
+            name: np.broadcast_to(x, count)[rows]
+            for name, x in self.poses.values.items()
+            if name in self.used
+        }
         return {**pose, **_joints(q)}
 
     def residual_on(self, rows: NDArray[np.intp], q: Array) -> Residual:
@@ -486,7 +518,9 @@ def _inner_angles(tree: Tree, joint: int) -> Iterator[Edit]:
     own = f"q{joint + 1}"
     calls = [part for part in parts_of(tree) if isinstance(part, Call) and names_of(part) == {own}]
     if {call.function for call in calls} == {"cos"}:
-        new = with_calls_changed(tree, ("cos",), lambda call: minus(call) if names_of(call) == {own} else call)
+        new = with_calls_changed(
+            tree, ("cos",), lambda call: minus(call) if names_of(call) == {own} else call
+        )
         yield Edit("supplement", new, tree, new)
 
 

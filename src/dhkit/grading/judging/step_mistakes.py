@@ -113,7 +113,12 @@ class SolutionMistakes:
         """
         step = self.context.derived(self.joint)
         derivation = self.context.derivation
-        if derivation is None or step is None or self.joint != 0 or not isinstance(step.form, Circle):
+        if (
+            derivation is None
+            or step is None
+            or self.joint != 0
+            or not isinstance(step.form, Circle)
+        ):
             return False
         values, _ = next(derivation.candidates(self.branch.poses.T))
         count = len(self.branch.q)

@@ -32,7 +32,10 @@ Residual: TypeAlias = Callable[[NDArray[np.intp], Array], Array]
 
 
 def other_root(
-    poses: Poses, joint: int, before: Sequence[int], residual_on: Callable[[NDArray[np.intp], Array], Residual]
+    poses: Poses,
+    joint: int,
+    before: Sequence[int],
+    residual_on: Callable[[NDArray[np.intp], Array], Residual],
 ) -> float | None:
     """Return a root of the equations that is not a joint value of any solution; None if all roots are solutions.
 
@@ -70,7 +73,9 @@ def other_root(
     # Roots that are the joint's value in a solution with the same values of the joints before are expected.
     gaps_before = poses.gaps(truths[..., before], q[:, None, before], list(before))
     is_expected = is_solution & np.all(gaps_before < _FAR, axis=-1)
-    gaps = np.where(is_expected[rows], poses.gaps(roots[:, None], truths[rows, :, joint], joint), np.inf)
+    gaps = np.where(
+        is_expected[rows], poses.gaps(roots[:, None], truths[rows, :, joint], joint), np.inf
+    )
     is_other = np.all(gaps > _FAR, axis=1)
 
     share = len(np.unique(rows[is_other])) / count

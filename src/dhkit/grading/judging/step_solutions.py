@@ -161,7 +161,11 @@ class Solutions:
 
         # q1 = phi - gamma follows q2 = +..., and q1 = phi + gamma follows q2 = -...: phi ∓ gamma is right as a pair.
         trials = [self._trial(hypothesis, step) for hypothesis in self.hypotheses]
-        pairs = [self._trial(each, step, in_pairs=True) for each in self.hypotheses if _has_pairs(each, step)]
+        pairs = [
+            self._trial(each, step, in_pairs=True)
+            for each in self.hypotheses
+            if _has_pairs(each, step)
+        ]
 
         # Right everywhere or, failing that, within the joint limits.
         least = 1.0 if self.context.poses.has_closed_form else 1.0 - MISSED_SHARE
@@ -181,7 +185,11 @@ class Solutions:
         same = None if first.in_pairs else self._same(first.values, step.joint)
         if same is not None:
             self.skip(step.joint)
-            return Part(Verdict.WRONG, f"solution {same}: gives the same as another", [("duplicate_branch", "")]), None
+            return Part(
+                Verdict.WRONG,
+                f"solution {same}: gives the same as another",
+                [("duplicate_branch", "")],
+            ), None
 
         self._hypotheses = [tuple(chain(*trial.following)) for trial in right]
         self.solved.add(step.joint)
@@ -197,7 +205,9 @@ class Solutions:
             poses = int(np.sum(self.context.within_limits))
             share = 100 * float(np.min(first.right))
             remarks.append(f"right{where}; beyond them at {share:.3g} % of the poses tried")
-        statement = f"solution: right at {poses} poses{where} given the joints before; tried, not proved"
+        statement = (
+            f"solution: right at {poses} poses{where} given the joints before; tried, not proved"
+        )
         verdict = Verdict.CORRECT if self.context.poses.has_closed_form else Verdict.UNDECIDED
         return Part(verdict, statement, remark="; ".join(remarks)), (len(step.solutions), count)
 
@@ -212,7 +222,9 @@ class Solutions:
         own = step.joint
         poses = self.context.poses
         if not poses.isolated:
-            raise AnswerError("solution: the joint values of a pose are not isolated; equations alone are judged")
+            raise AnswerError(
+                "solution: the joint values of a pose are not isolated; equations alone are judged"
+            )
         joints = [f"q{j + 1}" for j in range(self.context.description.n)]
         for tree in step.solutions:
             names = names_of(tree)
@@ -223,7 +235,9 @@ class Solutions:
                 raise AnswerError(f"solution: unknown name {unknown[0]!r}")
             later = [name for j, name in enumerate(joints) if j not in before and name in names]
             if later:
-                return Part(Verdict.INCOMPLETE, f"solution: uses {later[0]}, which no earlier step finds")
+                return Part(
+                    Verdict.INCOMPLETE, f"solution: uses {later[0]}, which no earlier step finds"
+                )
         return None
 
     # Hypotheses
@@ -242,7 +256,9 @@ class Solutions:
             for function in functions:
                 for sign in (1.0, -1.0):
                     has_sign = function(truths[..., j]) * sign > 0
-                    chosen = [replace(choice, alive=choice.alive & has_sign) for choice in hypothesis]
+                    chosen = [
+                        replace(choice, alive=choice.alive & has_sign) for choice in hypothesis
+                    ]
                     yield _all_choices([self._by_values(choice, joints) for choice in chosen])
 
         # Those of one branch of the closed form.
@@ -259,7 +275,9 @@ class Solutions:
             gaps = self.context.solved_poses.gaps(values, values[:, b : b + 1], joints)
             is_same = np.all(gaps < MATCHES, axis=-1)
             alive = choice.alive & choice.alive[:, b, None] & is_same
-            if not alive.any() or any(np.array_equal(alive, other.alive) for other in parts.values()):
+            if not alive.any() or any(
+                np.array_equal(alive, other.alive) for other in parts.values()
+            ):
                 continue
             q = choice.q.copy()
             q[:, joints] = np.where(alive.any(axis=1)[:, None], values[:, b], np.nan)
@@ -299,7 +317,9 @@ class Solutions:
     def _evaluated(self, tree: Tree, choice: Choice) -> Array:
         """Return the values of a formula at all poses, shape (S,), rad or m; NaN for no value."""
         given = {f"q{j + 1}": column for j, column in enumerate(choice.q.T)}
-        numbers = np.asarray(doubles(tree, {**self.context.solved_poses.values, **given}), dtype=float)
+        numbers = np.asarray(
+            doubles(tree, {**self.context.solved_poses.values, **given}), dtype=float
+        )
         x: Array = np.array(np.broadcast_to(numbers, len(choice.q)))
         x[~np.isfinite(x)] = np.nan
         return x
@@ -319,7 +339,9 @@ class Solutions:
     def _count(self, hypothesis: Hypothesis, joint: int) -> int:
         """Return the largest number of values that a joint may have after a choice."""
         values = self.truths[..., joint]
-        is_same = self.context.solved_poses.gaps(values[:, :, None], values[:, None, :], joint) < MATCHES
+        is_same = (
+            self.context.solved_poses.gaps(values[:, :, None], values[:, None, :], joint) < MATCHES
+        )
         is_earlier = np.tril(np.ones(is_same.shape[1:], dtype=bool), -1)
         most = 0
         for choice in hypothesis:
@@ -358,25 +380,40 @@ class Solutions:
             return Part(Verdict.WRONG, f"{subject}: no pose has the values of the joints before")
         right = np.array([trial.following[k][c].rows[s] for c, s in places])
         share = 100 * float(np.mean(right))
-        part = Part(Verdict.WRONG, f"{subject}: right at {share:.3g} % of {len(right)} poses given the joints before")
+        part = Part(
+            Verdict.WRONG,
+            f"{subject}: right at {share:.3g} % of {len(right)} poses given the joints before",
+        )
         branch = self._branch(step.solutions[k], trial.choices, places, own, before)
 
         # The first of them at which the formula is wrong, with the nearest right value.
         c, s = places[int(np.argmin(right))]
-        pose = {name: float(np.asarray(self.context.solved_poses.values[name])[s]) for name in POSE_NAMES}
+        pose = {
+            name: float(np.asarray(self.context.solved_poses.values[name])[s])
+            for name in POSE_NAMES
+        }
         pose |= {f"q{j + 1}": float(trial.choices[c].q[s, j]) for j in before}
         answer = float(trial.values[k][c][s])
         alive = np.flatnonzero(trial.choices[c].alive[s])
         truths = self.truths[s, alive, own]
         gaps = self.context.solved_poses.gaps(np.full(len(alive), answer), truths, own)
         nearest = int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))
-        part.witness = Witness(pose, answer if np.isfinite(answer) else None, float(truths[nearest]))
+        part.witness = Witness(
+            pose, answer if np.isfinite(answer) else None, float(truths[nearest])
+        )
         if self.context.explain:
-            part.mistakes = [self._mistake(branch, step, step.solutions[k], before) or ("solution_wrong", "")]
+            part.mistakes = [
+                self._mistake(branch, step, step.solutions[k], before) or ("solution_wrong", "")
+            ]
         return part
 
     def _branch(
-        self, tree: Tree, choices: Hypothesis, places: Sequence[tuple[int, int]], own: int, before: Sequence[int]
+        self,
+        tree: Tree,
+        choices: Hypothesis,
+        places: Sequence[tuple[int, int]],
+        own: int,
+        before: Sequence[int],
     ) -> Branch:
         """Return a branch with a formula for one joint; earlier joints have their values, and later ones follow.
 
@@ -401,7 +438,9 @@ class Solutions:
         trees[own] = tree
         return Branch(poses, tuple(trees), given_order=(*before, own, *later), judged_joint=own)
 
-    def _mistake(self, branch: Branch, step: GivenStep, tree: Tree, before: Sequence[int]) -> tuple[str, str] | None:
+    def _mistake(
+        self, branch: Branch, step: GivenStep, tree: Tree, before: Sequence[int]
+    ) -> tuple[str, str] | None:
         """Return the mistake in a wrong formula, and a detail; None if none explains it."""
 
         def is_right_for(other: StepContext) -> bool:

@@ -57,7 +57,12 @@ def number_of(entry: Expression, values: Mapping[str, float]) -> float:
 
 
 def link_entries(
-    convention: Convention, theta: tuple[_T, _T], d: _T, a: _T, alpha: tuple[_T, _T], unit: tuple[_T, _T]
+    convention: Convention,
+    theta: tuple[_T, _T],
+    d: _T,
+    a: _T,
+    alpha: tuple[_T, _T],
+    unit: tuple[_T, _T],
 ) -> list[list[_T]]:
     """Return the entries of A_i, four rows of four, in doubles, arrays of them or elements of a ring.
 
@@ -93,7 +98,9 @@ def link_entries(
     ]
 
 
-def link_in_doubles(convention: Convention, theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike) -> Array:
+def link_in_doubles(
+    convention: Convention, theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike
+) -> Array:
     """Return A_i in doubles, shape (..., 4, 4), of angles in rad and lengths in m of shape (...)."""
     theta, d, a, alpha = np.broadcast_arrays(theta, d, a, alpha)
     unit = (np.zeros(theta.shape), np.ones(theta.shape))
@@ -125,7 +132,9 @@ class TableArm:
     senses: Array
 
     @classmethod
-    def of_rows(cls, rows: Sequence[Row], kinds: str, convention: Convention, values: Mapping[str, float]) -> TableArm:
+    def of_rows(
+        cls, rows: Sequence[Row], kinds: str, convention: Convention, values: Mapping[str, float]
+    ) -> TableArm:
         """Return the arm of exact rows, at given values of parameters."""
         at_zero = dict(values) | {f"q{i + 1}": 0.0 for i in range(len(kinds))}
         entries = np.empty((len(rows), 4))
@@ -135,7 +144,11 @@ class TableArm:
 
     @classmethod
     def of_trees(
-        cls, rows: Sequence[Sequence[Tree]], kinds: str, convention: Convention, values: Mapping[str, float]
+        cls,
+        rows: Sequence[Sequence[Tree]],
+        kinds: str,
+        convention: Convention,
+        values: Mapping[str, float],
     ) -> TableArm | None:
         """Return the arm of an answer; None unless each row has its own variable, and no other, in the right column."""
         n = len(kinds)
@@ -177,7 +190,9 @@ class TableArm:
         travel = self.senses * q
         is_revolute = np.array([kind == "R" for kind in self.kinds])
         theta, d, a, alpha = self.entries.T
-        links = link_in_doubles(self.convention, theta + travel * is_revolute, d + travel * ~is_revolute, a, alpha)
+        links = link_in_doubles(
+            self.convention, theta + travel * is_revolute, d + travel * ~is_revolute, a, alpha
+        )
 
         # T_0i = T_0(i-1) A_i
         frames = [np.eye(4)]

@@ -66,7 +66,9 @@ class Answer:
         """
         n = description.n
         if len(rows) != n:
-            raise AnswerError(f"dh: {len(rows)} row{'s' * (len(rows) != 1)}; expected {n}, one a joint")
+            raise AnswerError(
+                f"dh: {len(rows)} row{'s' * (len(rows) != 1)}; expected {n}, one a joint"
+            )
         names = [*(f"q{i + 1}" for i in range(n)), *description.parameters]
         for i, row in enumerate(rows, start=1):
             if len(row) != len(COLUMNS):
@@ -74,7 +76,9 @@ class Answer:
         entries: list[tuple[Expression | None, ...]] = []
         for i, row in enumerate(rows, start=1):
             columns = zip(row, COLUMNS, strict=True)
-            entries.append(tuple(_entry(tree, names, f"dh, row {i}, {column}") for tree, column in columns))
+            entries.append(
+                tuple(_entry(tree, names, f"dh, row {i}, {column}") for tree, column in columns)
+            )
         return cls(tuple(tuple(row) for row in rows), tuple(entries))
 
 
@@ -88,7 +92,9 @@ def _entry(tree: Tree, names: Sequence[str], where: str) -> Expression | None:
     """
     unknown = sorted(names_of(tree) - {*names, *CONSTANTS})
     if unknown:
-        raise AnswerError(f"{where}: unknown name {unknown[0]!r}; expected {', '.join([*names, 'pi', 'deg'])}")
+        raise AnswerError(
+            f"{where}: unknown name {unknown[0]!r}; expected {', '.join([*names, 'pi', 'deg'])}"
+        )
     try:
         with budgeted():
             return value_of(tree, names)
@@ -147,9 +153,13 @@ class TableRows:
             if self.is_proved(i, self.reference[i]):
                 return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved")
             if written and self.is_proved(i, self.reference_in_numbers(i)):
-                return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", written)
+                return JudgedRow(
+                    Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", written
+                )
         if self.agrees_in_doubles(i):
-            statement = f"A{i + 1} agrees at {STATES} random states to {SAME_TRANSFORM:g}, without a proof"
+            statement = (
+                f"A{i + 1} agrees at {STATES} random states to {SAME_TRANSFORM:g}, without a proof"
+            )
             return JudgedRow(Verdict.UNDECIDED, statement)
         return JudgedRow(Verdict.WRONG, f"A{i + 1} differs")
 
@@ -174,12 +184,16 @@ class TableRows:
 
     def written(self, i: int) -> frozenset[str]:
         """Return the letters that row i has as numbers."""
-        letters = (self.reference[i][k].symbols for k in range(len(COLUMNS)) if self.is_written(i, k))
+        letters = (
+            self.reference[i][k].symbols for k in range(len(COLUMNS)) if self.is_written(i, k)
+        )
         return frozenset().union(*letters) & self.description.parameters.keys()
 
     def reference_in_numbers(self, i: int) -> Row:
         """Return row i of the file, with numbers where the answer has them."""
-        theta, d, a, alpha = (self._in_numbers(i, k, entry) for k, entry in enumerate(self.reference[i]))
+        theta, d, a, alpha = (
+            self._in_numbers(i, k, entry) for k, entry in enumerate(self.reference[i])
+        )
         return theta, d, a, alpha
 
     def _in_numbers(self, i: int, column: int, truth: Expression) -> Expression:
@@ -209,7 +223,9 @@ class TableRows:
             if not np.all(np.isfinite(entries)):
                 return False
             answer = link_in_doubles(self.convention, *entries)
-            truth = link_in_doubles(self.convention, *(number_of(entry, values) for entry in self.reference[i]))
+            truth = link_in_doubles(
+                self.convention, *(number_of(entry, values) for entry in self.reference[i])
+            )
             largest = max(1.0, float(np.max(np.abs(truth))))
             if not np.max(np.abs(answer - truth)) <= SAME_TRANSFORM * largest:
                 return False
@@ -303,7 +319,9 @@ class _RowReader:
         theta_direction = self.angle(theta)
         alpha_direction = self.angle(alpha)
         unit = (self.ring.zero, self.ring.one)
-        entries = link_entries(convention, theta_direction, self.length(d), self.length(a), alpha_direction, unit)
+        entries = link_entries(
+            convention, theta_direction, self.length(d), self.length(a), alpha_direction, unit
+        )
         return np.array(entries, dtype=object)
 
     def length(self, length: Expression) -> Element:

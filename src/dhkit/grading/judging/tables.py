@@ -28,7 +28,12 @@ from dhkit.grading.remarks import Note, NoteKind
 
 _OPEN_TASK = Requirements()
 """Requirements that leaves frames and zero pose open."""
-_UNEXPLAINED = {"theta": "wrong_theta", "d": "wrong_length", "a": "wrong_length", "alpha": "wrong_twist"}
+_UNEXPLAINED = {
+    "theta": "wrong_theta",
+    "d": "wrong_length",
+    "a": "wrong_length",
+    "alpha": "wrong_twist",
+}
 """Mistake for each column that is named if no more specific one explains a wrong entry."""
 
 
@@ -165,7 +170,9 @@ def _judge_in_other_frames(
             rows[i] = replace(rows[i], verdict=Verdict.UNDECIDED, statement=statement)
     entries = _entries(rows)
 
-    other_frames = _diagnosis_of_table("other_frames", entries, "; ".join(map(str, overlay.changes)))
+    other_frames = _diagnosis_of_table(
+        "other_frames", entries, "; ".join(map(str, overlay.changes))
+    )
     named = tuple(mistake.diagnosis() for mistake in mistakes if mistake.is_specific)
     diagnosis: tuple[Diagnosis, ...] = (other_frames,)
     if moves_zeros_only:
@@ -204,13 +211,17 @@ def _refusal(overlay: Overlay, task: Requirements) -> str:
 
 
 def _entries(rows: Sequence[JudgedRow]) -> tuple[Entry, ...]:
-    return tuple(Entry("dh", (i,), row.verdict, statement=row.statement) for i, row in enumerate(rows))
+    return tuple(
+        Entry("dh", (i,), row.verdict, statement=row.statement) for i, row in enumerate(rows)
+    )
 
 
 def _diagnosis_of_table(mistake: str, entries: Sequence[Entry], detail: str) -> Diagnosis:
     """Return a diagnosis of the whole table, which concerns all rows that are not right."""
     concerned = tuple(entry.name for entry in entries if entry.verdict is not Verdict.CORRECT)
-    return Diagnosis(mistake, sentence_of(mistake, detail=detail), "dh", concerned, hint_of(mistake))
+    return Diagnosis(
+        mistake, sentence_of(mistake, detail=detail), "dh", concerned, hint_of(mistake)
+    )
 
 
 def _written(table: TableRows) -> frozenset[str]:
@@ -242,7 +253,10 @@ def _overlay(table: TableRows) -> Overlay | None:
 def _is_of_other_convention(table: TableRows) -> bool:
     """Whether the rows, read in the other convention, are this arm."""
     other = replace(table, convention=other_convention(table.convention))
-    return all(other.row(i).verdict is Verdict.CORRECT for i in range(table.n)) or _overlay(other) is not None
+    return (
+        all(other.row(i).verdict is Verdict.CORRECT for i in range(table.n))
+        or _overlay(other) is not None
+    )
 
 
 # Mistakes in rows
@@ -273,7 +287,9 @@ class _RowMistake:
         """Return the diagnosis for a report."""
         sentence = sentence_of(self.mistake, self.where)
         names = (entry_name("dh", (self.row,)),)
-        return Diagnosis(self.mistake, sentence, f"dh, row {self.row + 1}", names, hint_of(self.mistake))
+        return Diagnosis(
+            self.mistake, sentence, f"dh, row {self.row + 1}", names, hint_of(self.mistake)
+        )
 
 
 def _row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[_RowMistake, ...]:
@@ -286,7 +302,10 @@ def _row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[_RowMistake, 
         if _matches(table, i, j) and _matches(table, j, i):
             unexplained = [k for k in unexplained if k not in (i, j)]
             where = f"rows {i + 1} and {j + 1}"
-            mistakes += [_RowMistake("rows_exchanged", i, where), _RowMistake("rows_exchanged", j, where)]
+            mistakes += [
+                _RowMistake("rows_exchanged", i, where),
+                _RowMistake("rows_exchanged", j, where),
+            ]
     for i in unexplained:
         if None not in table.answer.entries[i]:
             mistakes += _explain_row(table, i)
@@ -332,7 +351,9 @@ def _explain_entry(table: TableRows, i: int, k: int, truth: Expression) -> _RowM
     return _RowMistake(_UNEXPLAINED[COLUMNS[k]], i, where, is_specific=False)
 
 
-def _wrong_entries(table: TableRows, i: int, k: int, truth: Expression) -> Iterator[tuple[str, Expression]]:
+def _wrong_entries(
+    table: TableRows, i: int, k: int, truth: Expression
+) -> Iterator[tuple[str, Expression]]:
     """Yield mistakes in an entry, each with the entry that it gives.
 
     The right entry is the joint variable plus an offset in the joint's own column, and the offset alone elsewhere.

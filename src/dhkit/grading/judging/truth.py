@@ -64,7 +64,9 @@ class Truth:
         """Return a reader into a quantity's ring, with numbers for the parameters that the ring does not have."""
         ring = self.arm(quantity).ring
         names = self.description.parameters.keys() - set(ring.constants)
-        return RingReader(ring, numbers={name: exact_number(self.description, name) for name in names})
+        return RingReader(
+            ring, numbers={name: exact_number(self.description, name) for name in names}
+        )
 
     def of(self, quantity: str) -> Elements:
         """Return the right value of a quantity, an array of elements in the quantity's shape.
@@ -75,13 +77,17 @@ class Truth:
             A link has no body, and the quantity needs it.
         """
         if quantity not in self._values:
-            self._values[quantity] = self.coordinates.in_y(quantity, self._in_robot_variables(quantity))
+            self._values[quantity] = self.coordinates.in_y(
+                quantity, self._in_robot_variables(quantity)
+            )
         return self._values[quantity]
 
     def with_numbers(self, quantity: str, array: Elements, numbers: Collection[str]) -> Elements:
         """Return elements of a quantity's ring with the file's numbers instead of some parameters."""
         ring = self.arm(quantity).ring
-        return substituted(array, {p: ring.number(exact_number(self.description, p)) for p in numbers}, ring)
+        return substituted(
+            array, {p: ring.number(exact_number(self.description, p)) for p in numbers}, ring
+        )
 
     def _in_robot_variables(self, quantity: str) -> Elements:
         """Return the right value of a quantity in the robot's own joint variables."""
@@ -127,10 +133,14 @@ def kinematic_quantity(kinematics: TextbookKinematics, quantity: str) -> Element
 
 def substituted(array: Elements, values: Mapping[str, Element], ring: Ring) -> Elements:
     """Return elements with constants, given by their texts, replaced by elements of a ring."""
-    return translated_array(array, {ring.place("constant", text): value for text, value in values.items()}, ring)
+    return translated_array(
+        array, {ring.place("constant", text): value for text, value in values.items()}, ring
+    )
 
 
-def translated_array(array: Elements, places: Mapping[int, Element], ring: Ring | None = None) -> Elements:
+def translated_array(
+    array: Elements, places: Mapping[int, Element], ring: Ring | None = None
+) -> Elements:
     """Return elements with generators, given by their places, replaced; in their own ring unless another is given."""
     result = np.empty(array.shape, dtype=object)
     for index, element in np.ndenumerate(array):

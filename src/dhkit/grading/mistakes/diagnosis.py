@@ -87,7 +87,10 @@ class Variants:
             for name in LINK_MISTAKES:
                 made += [(MadeAt(name, i), f"link {i}") for i in range(1, n + 1)]
         made.append((MadeAt("translations_unrotated", n + 1), "tool"))
-        of_derivation = [Variant(at, _kinematic_change(truth, at), place, is_kinematic=True) for at, place in made]
+        of_derivation = [
+            Variant(at, _kinematic_change(truth, at), place, is_kinematic=True)
+            for at, place in made
+        ]
 
         right = partial(kinematic_quantity, truth.kinematics)
         return [
@@ -116,7 +119,10 @@ class Variants:
         by_entry: dict[tuple[Index, _Key], list[_Changed]] = {}
         variants = self.dynamic if quantity in DYNAMICS else self.kinematic
         for variant in variants:
-            keys = {place: _key_of(quantity, x) for place, x in np.ndenumerate(self.change(variant, quantity))}
+            keys = {
+                place: _key_of(quantity, x)
+                for place, x in np.ndenumerate(self.change(variant, quantity))
+            }
             if not any(keys.values()):
                 continue
             changed = _Changed(variant, keys)
@@ -168,7 +174,9 @@ class Variants:
         arm = self.truth.arm(quantity)
         q, qd, qdd = state_arrays(general_state(arm.n), arm.n)
         if quantity not in self._values:
-            changes = [self.change(changed.variant, quantity) for changed in self._changes[quantity]]
+            changes = [
+                self.change(changed.variant, quantity) for changed in self._changes[quantity]
+            ]
             self._values[quantity] = [arm.evaluate(change, q, qd, qdd) for change in changes]
         right = arm.evaluate(truth, q, qd, qdd)
         tolerance = _ROUNDED_DECIMALS * np.max(np.abs(right), initial=0.0)
@@ -206,7 +214,9 @@ class _Changed:
 def _kinematic_change(truth: Truth, made: MadeAt) -> Addition:
     """Return the function that gives a mistake's change of A1 ... An, T and J, derived when first called."""
     wrong = cache(lambda: derive_kinematics(truth.description, {made}))
-    return lambda quantity: kinematic_quantity(wrong(), quantity) - kinematic_quantity(truth.kinematics, quantity)
+    return lambda quantity: (
+        kinematic_quantity(wrong(), quantity) - kinematic_quantity(truth.kinematics, quantity)
+    )
 
 
 def _columns_exchanged(truth: Truth) -> Iterator[Variant]:
@@ -216,7 +226,13 @@ def _columns_exchanged(truth: Truth) -> Iterator[Variant]:
         order[i] = j
         order[j] = i
         change = partial(_with_columns, truth, order)
-        yield Variant(MadeAt("columns_exchanged"), change, f"columns {i + 1} and {j + 1}", 1, is_kinematic=True)
+        yield Variant(
+            MadeAt("columns_exchanged"),
+            change,
+            f"columns {i + 1} and {j + 1}",
+            1,
+            is_kinematic=True,
+        )
 
 
 def _with_columns(truth: Truth, order: list[int], quantity: str) -> Elements:
@@ -237,7 +253,9 @@ class _Pairs:
         wanted = _keys_of(self.quantity, differences)
         return self._summed(differences, wanted) or self._derived(wanted)
 
-    def _summed(self, differences: Differences, wanted: Mapping[Index, _Key]) -> tuple[Variant, Variant] | None:
+    def _summed(
+        self, differences: Differences, wanted: Mapping[Index, _Key]
+    ) -> tuple[Variant, Variant] | None:
         """Return a pair whose second mistake explains the differences that the first leaves."""
         for first in self.tables.textbook(self.quantity):
             change = self.tables.change(first, self.quantity)
@@ -285,7 +303,9 @@ class _Pairs:
 
 
 @lru_cache(maxsize=32)
-def variants_of(truth: Truth, numbers: frozenset[str]) -> Variants:  # without a default, which has a key of its own
+def variants_of(
+    truth: Truth, numbers: frozenset[str]
+) -> Variants:  # without a default, which has a key of its own
     """Return the mistakes on a robot; the same object each time, so that nothing is derived twice."""
     return Variants(truth, numbers)
 
@@ -297,7 +317,10 @@ def _judged_by(quantity: str) -> str:
 
 def _keys_of(quantity: str, differences: Differences) -> dict[Index, _Key]:
     """Return the normal forms of a quantity's differences; those of C by rows."""
-    return {place_of(quantity, index): _key_of(quantity, element) for index, element in differences.items()}
+    return {
+        place_of(quantity, index): _key_of(quantity, element)
+        for index, element in differences.items()
+    }
 
 
 def _key_of(quantity: str, element: Element) -> _Key:

@@ -39,9 +39,22 @@ _OF_REVOLUTE_JOINTS = frozenset(
     )
 )
 """Mistakes with the angle of a revolute joint, or with the inertia about its axis."""
-_RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
+_RARER = frozenset(
+    (
+        "omega_unturned",
+        "inertia_axes",
+        "com_rotation_transposed",
+        "gravity_axis",
+        "gravity_axis_back",
+    )
+)
 """Mistakes of the textbook that are rarer than others which give the same answers."""
-_INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
+_INERTIA_MISTAKES = (
+    "inertia_forgotten",
+    "inertia_about_joint",
+    "inertia_about_com_at_joint",
+    "inertia_doubled",
+)
 """Mistakes that may be made at some links alone, because the first link only turns about its own axis."""
 _EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
 """Pairs of axes, from 0, whose principal moments of inertia may be exchanged."""
@@ -107,7 +120,9 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
 
     # At all links, or at one.
     for name in names:
-        yield Variant(MadeAt(name), added_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name))
+        yield Variant(
+            MadeAt(name), added_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name)
+        )
         for i in range(1, n + 1):
             if n == 1 or not _is_possible(textbook, name, i):
                 continue
@@ -128,7 +143,9 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
         for part in several:
             if _is_possible(textbook, name, part.link):
                 made = part.mistake(name)
-                yield Variant(made, added_lazily(_derived, textbook, made), part.place, 1 + rarity(name))
+                yield Variant(
+                    made, added_lazily(_derived, textbook, made), part.place, 1 + rarity(name)
+                )
 
 
 def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
@@ -166,7 +183,9 @@ def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
             continue
         left_out = Change(-part.motion.K, -part.motion.V)
         yield Variant(part.mistake("payload_forgotten"), left_out.of, part.place)
-        yield Variant(part.mistake("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1)
+        yield Variant(
+            part.mistake("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1
+        )
         adds = added_lazily(_of_description, textbook, _with_com_of_first(arm.description, part))
         yield Variant(part.mistake("payload_at_com"), adds, part.place)
 
@@ -176,7 +195,9 @@ def _with_com_of_first(description: Description, part: _Part) -> Description:
     joints = list(description.joints)
     own = joints[part.link - 1]
     com = own.bodies[0].com
-    bodies = tuple(replace(body, com=com) if body.name == part.name else body for body in own.bodies)
+    bodies = tuple(
+        replace(body, com=com) if body.name == part.name else body for body in own.bodies
+    )
     joints[part.link - 1] = replace(own, bodies=bodies)
     return replace(description, joints=tuple(joints))
 
@@ -204,7 +225,9 @@ def _scaled_inertia(
 ) -> Iterator[Variant]:
     """Yield inertias of bodies about their centres of mass times a factor: of all bodies, of some, or of one."""
     if len(parts) > 1:
-        yield Variant(MadeAt(identity), added_lazily(_more_inertia, textbook, parts, factor - 1), rarity=1)
+        yield Variant(
+            MadeAt(identity), added_lazily(_more_inertia, textbook, parts, factor - 1), rarity=1
+        )
     by_link = {part.link: part for part in parts}
     has_one_each = len(by_link) == len(parts)
     if has_one_each:
@@ -213,7 +236,12 @@ def _scaled_inertia(
             yield Variant(MadeAt(identity), adds, _listed(links), 1)
     for part in parts:
         place = part.place if textbook.arm.n > 1 or part.name is not None else ""
-        yield Variant(part.mistake(identity), added_lazily(_more_inertia, textbook, [part], factor - 1), place, 1)
+        yield Variant(
+            part.mistake(identity),
+            added_lazily(_more_inertia, textbook, [part], factor - 1),
+            place,
+            1,
+        )
 
 
 def _is_rod(part: _Part) -> bool:
@@ -251,7 +279,9 @@ def _exchanged_moments(textbook: TextbookDerivation, part: _Part, a: int, b: int
     # K += sum over k of w_k^2 (I'_kk - I_kk) / 2
     omega = part.motion.omega
     ring = textbook.arm.ring
-    return Change(ring.sum(omega[k] * omega[k] * difference[k] * _HALF for k in range(3)), ring.zero)
+    return Change(
+        ring.sum(omega[k] * omega[k] * difference[k] * _HALF for k in range(3)), ring.zero
+    )
 
 
 # Drives
@@ -263,10 +293,17 @@ def _drives(textbook: TextbookDerivation) -> Iterator[Variant]:
     for i, j in combinations(range(arm.n), 2):
         if arm.rotor[i] or arm.rotor[j]:
             place = f"joints {i + 1} and {j + 1}"
-            yield Variant(MadeAt("drives_exchanged"), added_lazily(_exchanged_drives, textbook, i, j), place, 1)
+            yield Variant(
+                MadeAt("drives_exchanged"),
+                added_lazily(_exchanged_drives, textbook, i, j),
+                place,
+                1,
+            )
     driven = [i for i in range(arm.n) if arm.rotor[i] and _inverse(arm.gear[i]) is not None]
     if driven:
-        yield Variant(MadeAt("gear_inverted"), added_lazily(_inverted_gears, textbook, driven), rarity=1)
+        yield Variant(
+            MadeAt("gear_inverted"), added_lazily(_inverted_gears, textbook, driven), rarity=1
+        )
     if arm.n > 1:
         for i in driven:
             made = MadeAt("gear_inverted", i + 1)
@@ -294,7 +331,9 @@ def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Chan
         inverse = _inverse(ratio)
         if inverse is not None:
             rate = arm.ring.rate(i)
-            energies.append(arm.rotor[i] * (inverse * inverse - ratio * ratio) * rate * rate * _HALF)
+            energies.append(
+                arm.rotor[i] * (inverse * inverse - ratio * ratio) * rate * rate * _HALF
+            )
     return Change(arm.ring.sum(energies), arm.ring.zero)
 
 
@@ -354,14 +393,22 @@ def table_variants(truth: Truth) -> Iterator[Variant]:
 
     # The other convention.
     is_standard = description.convention is Convention.STANDARD
-    other = replace(description, convention=Convention.MODIFIED if is_standard else Convention.STANDARD)
-    yield Variant(MadeAt("convention_in_dynamics"), added_lazily(_of_description, textbook, other), rarity=1)
+    other = replace(
+        description, convention=Convention.MODIFIED if is_standard else Convention.STANDARD
+    )
+    yield Variant(
+        MadeAt("convention_in_dynamics"), added_lazily(_of_description, textbook, other), rarity=1
+    )
 
     # Twists with the opposite sign: all of them, or one.
-    twisted = [i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero]
+    twisted = [
+        i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero
+    ]
     if len(twisted) > 1:
         wrong = _with_twists_reversed(description, twisted)
-        yield Variant(MadeAt("twist_sign_in_dynamics"), added_lazily(_of_description, textbook, wrong), "", 1)
+        yield Variant(
+            MadeAt("twist_sign_in_dynamics"), added_lazily(_of_description, textbook, wrong), "", 1
+        )
     for i in twisted:
         wrong = _with_twists_reversed(description, [i])
         made = MadeAt("twist_sign_in_dynamics", i + 1)

@@ -47,7 +47,9 @@ def slip_between(truth: Truth, name: str, answer: Element, right: Element) -> Sl
     slip = slip_in(truth.arm(name), own(answer), own(right))
     if slip is None:
         return None
-    return replace(slip, detail=in_own_angles(truth, slip.detail), right=in_own_angles(truth, slip.right))
+    return replace(
+        slip, detail=in_own_angles(truth, slip.detail), right=in_own_angles(truth, slip.right)
+    )
 
 
 def in_own_angles(truth: Truth, text: str) -> str:
@@ -102,7 +104,9 @@ def _is_weight(truth: Truth, difference: Element) -> bool:
     names: set[str] = set()
     for component in truth.description.gravity:
         names |= component.symbols
-    places = [k for k, generator in enumerate(difference.ring.generators) if generator.text in names]
+    places = [
+        k for k, generator in enumerate(difference.ring.generators) if generator.text in names
+    ]
     if not places:
         return True
 
@@ -158,7 +162,9 @@ def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis
         own = truth.coordinates.in_own_rates
         text, terms = compare_terms(truth.arm(quantity.name), own(element), own(right))
     sentence = capitalize(f"{in_own_angles(truth, text)}.")
-    return Diagnosis(None, sentence, entry, (entry,), hint_of(None), second_hint=in_own_angles(truth, terms))
+    return Diagnosis(
+        None, sentence, entry, (entry,), hint_of(None), second_hint=in_own_angles(truth, terms)
+    )
 
 
 def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, str]:
@@ -178,7 +184,10 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
     ring = truth.ring
 
     def texts(terms: dict[tuple[int, ...], Fraction]) -> list[str]:
-        return [plain_text(ring.from_terms({monomial: coefficient})) for monomial, coefficient in terms.items()]
+        return [
+            plain_text(ring.from_terms({monomial: coefficient}))
+            for monomial, coefficient in terms.items()
+        ]
 
     missing = {m: c for m, c in right.items() if m not in given}
     too_much = {m: c for m, c in given.items() if m not in right}

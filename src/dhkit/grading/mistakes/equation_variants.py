@@ -57,7 +57,9 @@ def _signs(truth: Truth) -> Iterator[Variant]:
     yield Variant(MadeAt("gravity_torques_missing"), changed_only(lag, "tau", lambda: -lag.g))
     yield Variant(MadeAt("gravity_torque_sign"), changed_only(lag, "tau", lambda: -2 * lag.g))
     yield Variant(
-        MadeAt("inertial_torques_missing"), changed_only(lag, "tau", lambda: lag.h + lag.g - lag.tau), rarity=1
+        MadeAt("inertial_torques_missing"),
+        changed_only(lag, "tau", lambda: lag.h + lag.g - lag.tau),
+        rarity=1,
     )
     if not truth.coordinates.is_relative:
         yield Variant(MadeAt("motor_torques"), _motor_torques(truth))
@@ -75,8 +77,13 @@ def _steps(truth: Truth) -> Iterator[Variant]:
     for name in MISTAKES:
         if name in STEP_FACTORS or name in VELOCITY_FACTORS:
             yield Variant(MadeAt(name), _velocity_change(truth, momenta, name))
-    yield Variant(MadeAt("rate_of_cosine_sign"), changed_only(lag, "h", lambda: _mass_rate(lag, momenta) * -2))
-    yield Variant(MadeAt("chain_rule_forgotten"), changed_only(lag, "h", lambda: _without_chain_rule(lag, momenta)))
+    yield Variant(
+        MadeAt("rate_of_cosine_sign"), changed_only(lag, "h", lambda: _mass_rate(lag, momenta) * -2)
+    )
+    yield Variant(
+        MadeAt("chain_rule_forgotten"),
+        changed_only(lag, "h", lambda: _without_chain_rule(lag, momenta)),
+    )
 
 
 def _mass_rate(lag: Lagrangian, momenta: Elements) -> Elements:
@@ -179,7 +186,9 @@ def _matrices(truth: Truth) -> Iterator[Variant]:
     n = truth.description.n
     rates = element_array([lag.arm.ring.rate(i) for i in range(n)])
     if n > 1:
-        yield Variant(MadeAt("coriolis_transposed"), changed_only(lag, "h", lambda: lag.C.T @ rates - lag.h))
+        yield Variant(
+            MadeAt("coriolis_transposed"), changed_only(lag, "h", lambda: lag.C.T @ rates - lag.h)
+        )
     for i, j in combinations(range(n), 2):
         place = f"joints {i + 1} and {j + 1}"
         yield Variant(MadeAt("centrifugal_index"), _rates_exchanged(lag, i, j), place)
@@ -241,10 +250,18 @@ def _other_coordinates(truth: Truth) -> Iterator[Variant]:
     if absolute.is_relative:
         return
     if truth.coordinates.is_relative:
-        yield Variant(MadeAt("absolute_for_relative"), partial(_declared, truth, absolute, absolute.B), rarity=1)
+        yield Variant(
+            MadeAt("absolute_for_relative"),
+            partial(_declared, truth, absolute, absolute.B),
+            rarity=1,
+        )
     else:
         relative = Coordinates.relative(arm.n)
-        yield Variant(MadeAt("relative_for_absolute"), partial(_declared, truth, relative, absolute.S), rarity=1)
+        yield Variant(
+            MadeAt("relative_for_absolute"),
+            partial(_declared, truth, relative, absolute.S),
+            rarity=1,
+        )
 
 
 def _declared(truth: Truth, meant: Coordinates, matrix: Elements, quantity: str) -> Elements:
@@ -261,9 +278,13 @@ def _declared(truth: Truth, meant: Coordinates, matrix: Elements, quantity: str)
         # Variable i is read as the sum over j of (matrix_ij times the robot's variable j).
         weights = {j: int(matrix[i, j]) for j in range(n) if matrix[i, j]}
         for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
-            places[ring.place(kind, i)] = ring.sum(generator(j) * weight for j, weight in weights.items())
+            places[ring.place(kind, i)] = ring.sum(
+                generator(j) * weight for j, weight in weights.items()
+            )
         if i in ring.angles:
-            cosine, sine = sum_of_angles(ring, [multiple_angle(ring, j, weight) for j, weight in weights.items()])
+            cosine, sine = sum_of_angles(
+                ring, [multiple_angle(ring, j, weight) for j, weight in weights.items()]
+            )
             places[ring.place("cosine", i)] = cosine
             places[ring.place("sine", i)] = sine
     wrong = translated_array(answer, places)
@@ -294,8 +315,13 @@ def _shifted(lag: Lagrangian, i: int, sign: int) -> Addition:
     With the sign e: cos(q + e pi/2) = -e sin(q), sin(q + e pi/2) = e cos(q).
     """
     ring = lag.arm.ring
-    turned = {ring.place("cosine", i): ring.sine(i) * -sign, ring.place("sine", i): ring.cosine(i) * sign}
-    return lambda quantity: translated_array(right_value(lag, quantity), turned) - right_value(lag, quantity)
+    turned = {
+        ring.place("cosine", i): ring.sine(i) * -sign,
+        ring.place("sine", i): ring.cosine(i) * sign,
+    }
+    return lambda quantity: (
+        translated_array(right_value(lag, quantity), turned) - right_value(lag, quantity)
+    )
 
 
 # Friction
@@ -305,11 +331,15 @@ def _friction(truth: Truth) -> Iterator[Variant]:
     """Yield mistakes with the viscous friction of the drives, r^2 B qd for gear ratios r."""
     lag = truth.lagrangian
     arm = lag.arm
-    yield Variant(MadeAt("friction_forgotten"), changed_only(lag, "tau", lambda: truth.viscous * -1))
+    yield Variant(
+        MadeAt("friction_forgotten"), changed_only(lag, "tau", lambda: truth.viscous * -1)
+    )
     yield Variant(MadeAt("friction_sign"), changed_only(lag, "tau", lambda: truth.viscous * -2))
 
     # B qd or r B qd instead.
     for power in (0, 1):
-        torques = element_array([arm.gear[i] ** power * arm.viscous[i] * arm.ring.rate(i) for i in range(arm.n)])
+        torques = element_array(
+            [arm.gear[i] ** power * arm.viscous[i] * arm.ring.rate(i) for i in range(arm.n)]
+        )
         change = partial(np.subtract, torques, truth.viscous)
         yield Variant(MadeAt("friction_gear"), changed_only(lag, "tau", change))

@@ -86,7 +86,11 @@ def explain(
     # that explains only answers which follow from wrong ones is not the sheet's first error.
     for allowed in (_is_likely, _explains_several):
         single = _single(truth, judged, left, allowed)
-        _move(left, diagnoses, {names: one for names, one in single.items() if not following.issuperset(names)})
+        _move(
+            left,
+            diagnoses,
+            {names: one for names, one in single.items() if not following.issuperset(names)},
+        )
     _move(left, diagnoses, _nearly(truth, left, digits))
     for name in following & left.keys():
         del left[name]
@@ -104,7 +108,9 @@ def explain(
 
 
 def _move(
-    left: dict[str, JudgedQuantity], diagnoses: list[Diagnosis], explained: Mapping[tuple[str, ...], Diagnosis]
+    left: dict[str, JudgedQuantity],
+    diagnoses: list[Diagnosis],
+    explained: Mapping[tuple[str, ...], Diagnosis],
 ) -> None:
     """Append diagnoses, and remove the quantities that they explain, by whose names they are, from ``left``."""
     for names, diagnosis in explained.items():
@@ -144,7 +150,9 @@ def _single(
         differences = quantity.differences
         if differences:
             whole = tables_of(truth, quantity).whole(name, differences)
-            candidates[name] = [variant for variant in whole if not _contradicted(truth, judged, variant)]
+            candidates[name] = [
+                variant for variant in whole if not _contradicted(truth, judged, variant)
+            ]
 
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for names, variants in _fewest(candidates).items():
@@ -192,14 +200,22 @@ def _fewest(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], li
     return chosen
 
 
-def _nearly(truth: Truth, wrong: Mapping[str, JudgedQuantity], digits: int) -> dict[tuple[str, ...], Diagnosis]:
+def _nearly(
+    truth: Truth, wrong: Mapping[str, JudgedQuantity], digits: int
+) -> dict[tuple[str, ...], Diagnosis]:
     """Return the diagnoses of mistakes that explain quotients, and answers with rounded decimals, by quantities."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
         given = [entry for entry in quantity.given if entry.tree is not None]
         is_in_ring = all(quantity.findings[entry.index].answer is not None for entry in given)
-        is_rounded = any(entry.tree is not None and has_decimals(entry.tree, digits) for entry in given)
-        if name in ("C", "V", "L") or not is_in_ring or not (is_rounded or quantity.differences is None):
+        is_rounded = any(
+            entry.tree is not None and has_decimals(entry.tree, digits) for entry in given
+        )
+        if (
+            name in ("C", "V", "L")
+            or not is_in_ring
+            or not (is_rounded or quantity.differences is None)
+        ):
             continue
         by = Comparison(truth.arm(name), truth.reader(name), digits)
         likely = tables_of(truth, quantity).near(name, quantity.truth, _numbers(truth, quantity))
@@ -213,10 +229,16 @@ def _numbers(truth: Truth, quantity: JudgedQuantity) -> Mapping[Index, float]:
     """Return an answer's values at the state that :meth:`Variants.near` uses, SI units."""
     arm = truth.arm(quantity.name)
     values = {**arm.description.numbers.values, **general_state(arm.n)}
-    return {entry.index: float(doubles(entry.tree, values)) for entry in quantity.given if entry.tree is not None}
+    return {
+        entry.index: float(doubles(entry.tree, values))
+        for entry in quantity.given
+        if entry.tree is not None
+    }
 
 
-def _explains_answer(truth: Truth, variant: Variant, quantity: JudgedQuantity, by: Comparison) -> bool:
+def _explains_answer(
+    truth: Truth, variant: Variant, quantity: JudgedQuantity, by: Comparison
+) -> bool:
     """Whether a mistake gives an answer exactly, or within the rounding of its decimals."""
     change = tables_of(truth, quantity).change(variant, quantity.name)
     return all(
@@ -229,13 +251,19 @@ def _explains_answer(truth: Truth, variant: Variant, quantity: JudgedQuantity, b
 # Slips in single terms
 
 
-def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+def _slips(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity
+) -> list[Diagnosis]:
     """Return the diagnoses of one slip in a term of each wrong entry; none if an entry has no slip."""
     slip_of = entries.slip_of_C if quantity.name == "C" else entries.slip_of
     diagnoses: list[Diagnosis] = []
     for index in entries.distinct(quantity):
         slip = slip_of(truth, quantity, index)
-        if slip is None or entries.mirrored(quantity, index) or entries.whole_factor(quantity, index):
+        if (
+            slip is None
+            or entries.mirrored(quantity, index)
+            or entries.whole_factor(quantity, index)
+        ):
             return []
         diagnoses.append(diagnosis_of_slip(quantity, index, slip))
 
@@ -250,13 +278,17 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
 # Rarer mistakes
 
 
-def _rare(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+def _rare(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity
+) -> list[Diagnosis]:
     """Return the diagnoses of single mistakes that are possible, but rare."""
     found = _single(truth, judged, {quantity.name: quantity}, _is_rare)
     return list(found.values())
 
 
-def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+def _whole_factor(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity
+) -> list[Diagnosis]:
     """Return the diagnoses of a factor that all wrong entries share; none if they share none."""
     wrong = entries.distinct(quantity)
     if any(entries.mirrored(quantity, index) for index in wrong):
@@ -270,7 +302,9 @@ def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: 
     return factors if is_shared else []
 
 
-def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+def _parts(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity
+) -> list[Diagnosis]:
     """Explain torques and the Lagrangian by parts: terms with accelerations, with products of rates, with neither."""
     differences = quantity.differences
     if quantity.name not in ("tau", "L") or not differences:
@@ -284,12 +318,16 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         (right if is_right else wrong)[part] = whole
 
     def leaves_right_parts(variant: Variant) -> bool:
-        unchanged = [tables.changes_none(variant, part, list(whole)) for part, whole in right.items()]
+        unchanged = [
+            tables.changes_none(variant, part, list(whole)) for part, whole in right.items()
+        ]
         return all(unchanged)
 
     candidates: dict[str, list[Variant]] = {}
     for part, whole in wrong.items():
-        candidates[part] = [variant for variant in tables.whole(part, whole) if leaves_right_parts(variant)]
+        candidates[part] = [
+            variant for variant in tables.whole(part, whole) if leaves_right_parts(variant)
+        ]
     explained = _fewest(candidates)
     diagnoses = [diagnosis_of(variants, [quantity]) for variants in explained.values()]
     if not diagnoses and not right:
@@ -301,7 +339,9 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
     return diagnoses
 
 
-def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Differences) -> list[Diagnosis]:
+def _part_entries(
+    truth: Truth, quantity: JudgedQuantity, part: str, whole: Differences
+) -> list[Diagnosis]:
     """Explain the entries of a part one by one."""
     diagnoses = []
     for index, difference in whole.items():
@@ -315,12 +355,18 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
             diagnoses.append(diagnosis_of_slip(quantity, place, slip))
             continue
         difference = truth.coordinates.in_own_rates(difference)
-        excess = entries.in_own_angles(truth, plain_text(readable(truth.arm(quantity.name), difference)))
-        diagnoses.append(Diagnosis(None, f"Too much {_PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
+        excess = entries.in_own_angles(
+            truth, plain_text(readable(truth.arm(quantity.name), difference))
+        )
+        diagnoses.append(
+            Diagnosis(None, f"Too much {_PARTS[part]}: {excess}.", entry, (entry,), hint_of(None))
+        )
     return diagnoses
 
 
-def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+def _pair(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity
+) -> list[Diagnosis]:
     """Return the diagnoses of two mistakes of a derivation that together explain a quantity; none if no two do."""
     differences = quantity.differences
     terms = sum(map(len, differences.values())) if differences else 0
@@ -362,7 +408,9 @@ def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mappin
         parts["g"][index] = ring.from_terms(resting)
         by_joint = [_coefficient(element, k) for k in accelerations]
         for j in range(n):
-            parts["M"][*index, j] = ring.sum(by_joint[k] * int(truth.coordinates.B[k, j]) for k in range(n))
+            parts["M"][*index, j] = ring.sum(
+                by_joint[k] * int(truth.coordinates.B[k, j]) for k in range(n)
+            )
     return parts
 
 
@@ -389,7 +437,9 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
             diagnoses.append(diagnosis_of_slip(quantity, index, slip))
         else:
             tables = tables_of(truth, quantity)
-            candidates[index] = tables.entry(quantity.name, index, difference) if difference is not None else []
+            candidates[index] = (
+                tables.entry(quantity.name, index, difference) if difference is not None else []
+            )
 
     # A single entry proves little: many entries of transforms look alike, and so do those of a confused answer.
     certain = quantity.name in DYNAMICS and all(candidates.values())

@@ -49,7 +49,9 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
             for x, y in pairs:
                 swapped[x] = ring.constant(y)
                 swapped[y] = ring.constant(x)
-            yield Variant(MadeAt("links_exchanged"), _replaced(truth, swapped), f"links {i} and {j}", 1)
+            yield Variant(
+                MadeAt("links_exchanged"), _replaced(truth, swapped), f"links {i} and {j}", 1
+            )
 
 
 def _factors(truth: Truth, symbols: list[str], kinds: Mapping[str, str]) -> Iterator[Variant]:
@@ -59,7 +61,12 @@ def _factors(truth: Truth, symbols: list[str], kinds: Mapping[str, str]) -> Iter
         for name in symbols:
             # A length has the wrong sign where an offset is on the other side; a mass or an inertia has none.
             rarity = 1 if factor > 0 or kinds.get(name) == "length" else 2
-            yield Variant(MadeAt(identity), _replaced(truth, {name: ring.constant(name) * factor}), name, rarity)
+            yield Variant(
+                MadeAt(identity),
+                _replaced(truth, {name: ring.constant(name) * factor}),
+                name,
+                rarity,
+            )
 
 
 def _units(truth: Truth, lengths: list[str]) -> Iterator[Variant]:
@@ -126,7 +133,9 @@ def _kinds(description: Description) -> dict[str, str]:
 
 def _are_alike(first: str, second: str, kinds: Mapping[str, str]) -> bool:
     """Whether two parameters may be confused: they are of the same kind, or have the same letters."""
-    return kinds.get(first, first) == kinds.get(second, second) or _letters(first) == _letters(second)
+    return kinds.get(first, first) == kinds.get(second, second) or _letters(first) == _letters(
+        second
+    )
 
 
 def _are_of_links(first: str, second: str, i: int, j: int) -> bool:

@@ -27,7 +27,11 @@ from dhkit.symbolic.ring import Elements
 
 _DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))
 """Factors, besides pi and 1/pi, of angles in which degrees and radians are confused."""
-_ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
+_ZEROS = {
+    "h": "velocity_torques_missing",
+    "C": "velocity_torques_missing",
+    "g": "gravity_torques_missing",
+}
 """Mistake if all entries of a quantity are zero, by the quantity; ``entry_zero`` for others."""
 _RATE = re.compile(r"qd\d+")
 """Names of rates."""
@@ -35,17 +39,23 @@ _MIN_DIGITS = 2
 """Smallest number of significant digits of decimals that count as too short rather than wrong."""
 
 
-def in_degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
+def in_degrees(
+    truth: Truth, wrong: Mapping[str, JudgedQuantity]
+) -> dict[tuple[str, ...], Diagnosis]:
     """Return the diagnoses of quantities that are right without the factors pi/180 or 180/pi of their angles."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        readers = [RingReader(truth.arm(name).ring, angle_factor=factor) for factor in _DEGREE_FACTORS]
+        readers = [
+            RingReader(truth.arm(name).ring, angle_factor=factor) for factor in _DEGREE_FACTORS
+        ]
         if name != "C" and any(_is_right(quantity, reader) for reader in readers):
             diagnoses[(name,)] = diagnosis_of_whole(quantity, "degrees_for_radians")
     return diagnoses
 
 
-def _is_right(quantity: JudgedQuantity, reader: RingReader, change: Callable[[Tree], Tree] = lambda tree: tree) -> bool:
+def _is_right(
+    quantity: JudgedQuantity, reader: RingReader, change: Callable[[Tree], Tree] = lambda tree: tree
+) -> bool:
     """Whether all wrong entries are right after a change, or with another reader."""
     for entry in quantity.given:
         if quantity.findings[entry.index].verdict is not Verdict.WRONG:
@@ -61,7 +71,9 @@ def _is_right(quantity: JudgedQuantity, reader: RingReader, change: Callable[[Tr
     return True
 
 
-def with_inverted_gears(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
+def with_inverted_gears(
+    truth: Truth, wrong: Mapping[str, JudgedQuantity]
+) -> dict[tuple[str, ...], Diagnosis]:
     """Return the diagnoses of quantities that are right if the gear ratios in them are inverted.
 
     They are ratios in letters; for ratios in numbers there are variants.
@@ -74,22 +86,30 @@ def with_inverted_gears(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> di
         return {}
 
     one = Number(Fraction(1), "1", 0)
-    inverses: dict[str, Tree] = {name: Product(((True, one), (False, Name(name, 0)))) for name in gears}
+    inverses: dict[str, Tree] = {
+        name: Product(((True, one), (False, Name(name, 0)))) for name in gears
+    }
     invert = partial(renamed, change=inverses)
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        if name in ("M", "K", "tau") and _is_right(quantity, RingReader(truth.arm(name).ring), invert):
+        if name in ("M", "K", "tau") and _is_right(
+            quantity, RingReader(truth.arm(name).ring), invert
+        ):
             diagnoses[(name,)] = diagnosis_of_whole(quantity, "gear_inverted")
     return diagnoses
 
 
-def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
+def weights_on_vertical_axes(
+    truth: Truth, left: dict[str, JudgedQuantity], following: set[str]
+) -> list[Diagnosis]:
     """Remove g from ``left`` if its only errors are torques at joints that have none; return their diagnoses."""
     g = left.get("g")
     if g is None or "g" in following or any(g.right(index) for index in g.wrong_indices):
         return []
     slips = [slip_of(truth, g, index) for index in g.wrong_indices]
-    weights = [slip for slip in slips if slip is not None and slip.identity == "weight_on_vertical_axis"]
+    weights = [
+        slip for slip in slips if slip is not None and slip.identity == "weight_on_vertical_axis"
+    ]
     if len(weights) < len(slips):
         return []
     del left["g"]
@@ -98,7 +118,9 @@ def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], foll
     return [replace(diagnosis_of_slip(g, index, slip), equivalent=alike) for index, slip in pairs]
 
 
-def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
+def one_entry_of_C(
+    truth: Truth, left: dict[str, JudgedQuantity], following: set[str]
+) -> list[Diagnosis]:
     """Remove C from ``left`` if a single entry is not the Christoffel factorization's; return its diagnosis."""
     C = left.get("C")
     wrong = C.wrong_indices if C is not None else []
@@ -111,19 +133,29 @@ def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set
     return [replace(diagnosis_of_slip(C, wrong[0], slip), equivalent=equivalent(truth, C))]
 
 
-def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
+def zeros(
+    truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]
+) -> dict[tuple[str, ...], Diagnosis]:
     """Return the diagnoses of quantities that were handed in as zero."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in left.items():
         wrong = quantity.wrong_indices
-        if name in following or not quantity.is_zero or any(mirrored(quantity, index) for index in wrong):
+        if (
+            name in following
+            or not quantity.is_zero
+            or any(mirrored(quantity, index) for index in wrong)
+        ):
             continue
         identity = _ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
-        diagnoses[(name,)] = replace(diagnosis_of_whole(quantity, identity), equivalent=equivalent(truth, quantity))
+        diagnoses[(name,)] = replace(
+            diagnosis_of_whole(quantity, identity), equivalent=equivalent(truth, quantity)
+        )
     return diagnoses
 
 
-def without_rates(left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
+def without_rates(
+    left: Mapping[str, JudgedQuantity], following: set[str]
+) -> dict[tuple[str, ...], Diagnosis]:
     """Return the diagnoses of C and h if they are not zero and contain no rate."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name in ("C", "h"):
@@ -137,7 +169,9 @@ def without_rates(left: Mapping[str, JudgedQuantity], following: set[str]) -> di
     return diagnoses
 
 
-def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
+def in_other_units(
+    truth: Truth, left: Mapping[str, JudgedQuantity]
+) -> dict[tuple[str, ...], Diagnosis]:
     """Return the diagnoses of quantities with lengths as numbers in another unit; other parameters may be symbols."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     lengths = lengths_of(truth.description)
@@ -146,7 +180,12 @@ def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tup
         names = set().union(*map(names_of, trees))
         absent = [parameter for parameter in lengths if parameter not in names]
         ring = truth.arm(name).ring
-        if name not in DYNAMICS or name == "C" or not absent or not set(absent) <= set(ring.constants):
+        if (
+            name not in DYNAMICS
+            or name == "C"
+            or not absent
+            or not set(absent) <= set(ring.constants)
+        ):
             continue
         for identity, factor in UNITS.items():
             values = {p: ring.number(exact_number(truth.description, p) * factor) for p in absent}
@@ -159,11 +198,14 @@ def _has_answers(quantity: JudgedQuantity, expected: Elements) -> bool:
     """Whether all wrong entries equal the expected ones."""
     answers = [(index, quantity.findings[index].answer) for index in quantity.wrong_indices]
     return all(
-        answer is not None and answer.numerator_of_difference(expected[index]).is_zero for index, answer in answers
+        answer is not None and answer.numerator_of_difference(expected[index]).is_zero
+        for index, answer in answers
     )
 
 
-def too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
+def too_few_digits(
+    truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity
+) -> list[Diagnosis]:
     """Return the diagnosis of decimals that would be right within rounding if fewer digits were enough."""
     name = quantity.name
     if name in ("C", "V", "L"):

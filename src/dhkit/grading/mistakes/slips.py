@@ -101,7 +101,11 @@ def _listed(noun: str, numbers: Sequence[int]) -> str:
     plural = "s" * (len(numbers) > 1)
     texts = [str(number) for number in numbers]
     listed = " and ".join(texts) if len(texts) < 3 else f"{', '.join(texts[:-1])} and {texts[-1]}"
-    return f"{noun}{plural} {listed}" if noun == "link" else f"{noun}{plural} of joint{plural} {listed}"
+    return (
+        f"{noun}{plural} {listed}"
+        if noun == "link"
+        else f"{noun}{plural} of joint{plural} {listed}"
+    )
 
 
 def _slip(answer: Element, truth: Element) -> Slip | None:
@@ -155,7 +159,9 @@ def _rescaled(ring: PolynomialRing, shared: _Terms, right: _Terms) -> Slip | Non
         return None
 
     # Terms with the same sines, cosines and rates are one term for a person, however many parameters multiply it.
-    are_one_term = len(shared) <= BOUNDS.slip_terms or len({_state_part(ring, m) for m in shared}) == 1
+    are_one_term = (
+        len(shared) <= BOUNDS.slip_terms or len({_state_part(ring, m) for m in shared}) == 1
+    )
     are_whole_entry = len(shared) > 1 and len(shared) == len(right)
     if not are_one_term or are_whole_entry:
         return None
@@ -175,7 +181,9 @@ def _rescaled(ring: PolynomialRing, shared: _Terms, right: _Terms) -> Slip | Non
 
 def _state_part(ring: PolynomialRing, term: tuple[int, ...]) -> tuple[int, ...]:
     """Return a term without its parameters."""
-    return tuple(0 if g.kind == "constant" else e for g, e in zip(ring.generators, term, strict=True))
+    return tuple(
+        0 if g.kind == "constant" else e for g, e in zip(ring.generators, term, strict=True)
+    )
 
 
 def _is_mixed_term(term: tuple[int, ...], right: _Terms) -> bool:
@@ -207,7 +215,10 @@ def _replaced(ring: PolynomialRing, missing: _Terms, new: _Terms) -> Slip | None
 
 
 def _slip_of_pairs(
-    ring: PolynomialRing, pairs: Mapping[tuple[int, ...], tuple[int, ...]], missing: _Terms, new: _Terms
+    ring: PolynomialRing,
+    pairs: Mapping[tuple[int, ...], tuple[int, ...]],
+    missing: _Terms,
+    new: _Terms,
 ) -> Slip | None:
     """Return the slip if new terms stand instead of missing ones by the same exchange of generators."""
     exchanges = {_exponents_less(new_term, old_term) for old_term, new_term in pairs.items()}
@@ -243,7 +254,10 @@ def _exponents_less(term: tuple[int, ...], other: tuple[int, ...]) -> tuple[int,
 
 
 def _identity(
-    ring: PolynomialRing, removed: list[tuple[Generator, int]], added: list[tuple[Generator, int]], old: tuple[int, ...]
+    ring: PolynomialRing,
+    removed: list[tuple[Generator, int]],
+    added: list[tuple[Generator, int]],
+    old: tuple[int, ...],
 ) -> str:
     """Return the mistake that an exchange of generators in a term is.
 
@@ -257,12 +271,18 @@ def _identity(
         The term before the exchange.
     """
     if not added:
-        remaining = [old[ring.generators.index(generator)] - exponent for generator, exponent in removed]
+        remaining = [
+            old[ring.generators.index(generator)] - exponent for generator, exponent in removed
+        ]
         return "exponent_dropped" if all(remaining) else "factor_missing"
     if not removed:
         return "factor_extra"
     kinds = {generator.kind for generator, _ in (*removed, *added)}
-    if kinds == {"sine", "cosine"} and len(removed) == len(added) == 1 and removed[0][0].joints == added[0][0].joints:
+    if (
+        kinds == {"sine", "cosine"}
+        and len(removed) == len(added) == 1
+        and removed[0][0].joints == added[0][0].joints
+    ):
         return "term_function"
     if kinds <= {"sine", "cosine"}:
         return "term_angle"

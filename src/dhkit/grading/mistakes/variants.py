@@ -100,7 +100,9 @@ class Variant:
     place: str = ""
     rarity: int = 0
     is_kinematic: bool = False
-    _changes: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)  # a cache
+    _changes: dict[tuple[str, Coordinates], Elements] = field(
+        default_factory=dict, repr=False
+    )  # a cache
 
     @property
     def identity(self) -> str:

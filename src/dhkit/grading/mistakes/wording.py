@@ -40,7 +40,9 @@ def merge(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
             places += diagnosis.where.split(", ")
             entries += diagnosis.entries
         ordered = sorted(dict.fromkeys(places), key=_is_after_quantities)
-        merged.append(replace(first, where=", ".join(ordered), entries=tuple(dict.fromkeys(entries))))
+        merged.append(
+            replace(first, where=", ".join(ordered), entries=tuple(dict.fromkeys(entries)))
+        )
     return merged
 
 
@@ -84,8 +86,12 @@ def diagnosis_of(
         detail = _CHRISTOFFEL.get(first.identity, "") if of_C else ""
         sentence = sentence_of(first.identity, first.place, detail)
 
-    equivalent = tuple(dict.fromkeys(variant.name for variant in variants if variant.name != first.name))
-    return Diagnosis(first.identity, sentence, ", ".join(places), entries, hint_of(first.identity), equivalent)
+    equivalent = tuple(
+        dict.fromkeys(variant.name for variant in variants if variant.name != first.name)
+    )
+    return Diagnosis(
+        first.identity, sentence, ", ".join(places), entries, hint_of(first.identity), equivalent
+    )
 
 
 def _clause(variant: Variant, of_C: bool) -> str:
@@ -101,10 +107,16 @@ def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Dia
     entry = entry_name(quantity.name, index)
     if slip.identity != "term_missing":
         sentence = sentence_of(slip.identity, detail=slip.detail)
-        return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity), second_hint=slip.right)
+        return Diagnosis(
+            slip.identity, sentence, entry, (entry,), hint_of(slip.identity), second_hint=slip.right
+        )
     # The right term would be the answer: the first hint says only where it comes from.
     sentence = sentence_of(slip.identity, detail=f"one with {slip.kind}" if slip.kind else "")
-    hint = f"Look again at the terms with {slip.kind}: is each there?" if slip.kind else hint_of(slip.identity)
+    hint = (
+        f"Look again at the terms with {slip.kind}: is each there?"
+        if slip.kind
+        else hint_of(slip.identity)
+    )
     return Diagnosis(slip.identity, sentence, entry, (entry,), hint, second_hint=slip.detail)
 
 

@@ -19,7 +19,12 @@ def gradescope(report: GradeReport, marks: Marks) -> dict[str, object]:
 
     Source: Gradescope, Autograder Specifications, "Output Format".
     """
-    lines = [summary(report, marks), *diagnosis_lines(report), *remark_lines(report), provenance(report)]
+    lines = [
+        summary(report, marks),
+        *diagnosis_lines(report),
+        *remark_lines(report),
+        provenance(report),
+    ]
     facts = {"version": report.version, "robot": report.robot, "digest": report.digest}
     return {
         "score": marks.points,

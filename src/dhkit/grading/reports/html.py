@@ -65,7 +65,9 @@ def html_report(report: GradeReport, marks: Marks) -> str:
 
 def html_class(reports: Sequence[GradeReport], marks: Sequence[Marks], title: str = "Class") -> str:
     """Return the page of a class: mistakes with their frequency, a table of marks, then the sheets in order."""
-    parts = [f'<p class="error">{_text(line)}</p>' for line in sentences.own_robot_warnings(reports)]
+    parts = [
+        f'<p class="error">{_text(line)}</p>' for line in sentences.own_robot_warnings(reports)
+    ]
     parts += [*_mistake_bars(reports), "<h2>Marks</h2>", _marks_table(reports, marks)]
     for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):
         parts.append(f'<section id="sheet-{number}">\n<h2>{_sheet_name(report, number)}</h2>')
@@ -101,7 +103,11 @@ def _sections(report: GradeReport, marks: Marks) -> Iterator[str]:
         else:
             yield _entry(entry, mark)
     if correct:
-        yield f"<details><summary>{len(correct)} correct</summary>\n" + "\n".join(correct) + "\n</details>"
+        yield (
+            f"<details><summary>{len(correct)} correct</summary>\n"
+            + "\n".join(correct)
+            + "\n</details>"
+        )
     yield from (f'<p class="note">{_text(line)}</p>' for line in sentences.remark_lines(report))
     yield f'<p class="note">{_text(sentences.provenance(report))}</p>'
 
@@ -132,7 +138,9 @@ def _entry(entry: Entry, mark: Mark) -> str:
     if entry.latex:
         lines.append(f"<p>read as</p>{_equation(entry.latex, entry.read)}")
     if entry.difference is not None:
-        lines.append(f"<p>answer less the truth</p>{_equation(entry.difference_latex, entry.difference)}")
+        lines.append(
+            f"<p>answer less the truth</p>{_equation(entry.difference_latex, entry.difference)}"
+        )
     if entry.witness is not None:
         lines.append(f"<p>{_text(sentences.witness_sentence(entry.witness))}</p>")
     if entry.statement:
@@ -151,7 +159,9 @@ def _marks_table(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     """Return the table of a class's marks: a row for each sheet, a column for each quantity."""
     all_marks = chain.from_iterable(sheet.quantities for sheet in marks)
     quantities = list(dict.fromkeys(mark.name for mark in all_marks))
-    heads = "".join(f"<th>{_text(head, 40)}</th>" for head in ("student", "verdict", "points", *quantities))
+    heads = "".join(
+        f"<th>{_text(head, 40)}</th>" for head in ("student", "verdict", "points", *quantities)
+    )
     rows = [f"<tr>{heads}</tr>"]
     for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):
         by_quantity = {mark.name: points(mark.points) for mark in sheet.quantities}
@@ -159,7 +169,9 @@ def _marks_table(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
         cells = "".join(f'<td class="number">{cell}</td>' for cell in numbers)
         link = f'<a href="#sheet-{number}">{_sheet_name(report, number)}</a>'
         conditions = "" if report.error else _conditions(report)
-        rows.append(f"<tr><td>{link}</td><td>{_badge(report.verdict)} {conditions}</td>{cells}</tr>")
+        rows.append(
+            f"<tr><td>{link}</td><td>{_badge(report.verdict)} {conditions}</td>{cells}</tr>"
+        )
     return '<div class="wide"><table>' + "\n".join(rows) + "</table></div>"
 
 

@@ -16,7 +16,9 @@ from dhkit.grading.marks import Marks
 from dhkit.grading.rubric import Feedback
 
 
-def json_report(report: GradeReport, marks: Marks, feedback: Feedback = "full") -> dict[str, object]:
+def json_report(
+    report: GradeReport, marks: Marks, feedback: Feedback = "full"
+) -> dict[str, object]:
     """Return a report with its marks as plain data.
 
     Parameters
@@ -59,7 +61,9 @@ def read_reports(path: Path) -> Iterator[GradeReport]:
     except DescriptionError as error:
         raise AnswerError(str(error).replace("expected a robot file", "expected reports")) from None
     except UnicodeDecodeError as error:
-        raise AnswerError(f"{path}: byte {error.start} is not UTF-8; expected reports in JSON") from None
+        raise AnswerError(
+            f"{path}: byte {error.start} is not UTF-8; expected reports in JSON"
+        ) from None
     lines = [text] if _is_json(text) else text.splitlines()
     for number, line in enumerate(lines, start=1):
         if line.strip():
@@ -71,7 +75,9 @@ def _read_report(text: str, place: str) -> GradeReport:
         feedback = jsons.loads(text).get("feedback", "full")
         report = report_of(text)
     except (ValueError, AttributeError, RecursionError) as error:
-        raise AnswerError(f"{place}: {_fault(error)}; expected a report as `dhkit grade --json` writes it") from None
+        raise AnswerError(
+            f"{place}: {_fault(error)}; expected a report as `dhkit grade --json` writes it"
+        ) from None
     if feedback != "full":
         raise AnswerError(
             f"{place}: feedback: found {str(feedback)[:60]!r}; expected 'full': no other can be marked again"

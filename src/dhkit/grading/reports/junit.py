@@ -52,12 +52,18 @@ def _add_suite(root: Element, report: GradeReport, marks: Marks) -> None:
     for one in cases(report, marks):
         _add_case(suite, one)
     suite.set("tests", str(len(suite.findall("testcase"))))
-    for attribute, outcome in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+    for attribute, outcome in (
+        ("failures", "failure"),
+        ("errors", "error"),
+        ("skipped", "skipped"),
+    ):
         suite.set(attribute, str(len(suite.findall(f"testcase/{outcome}"))))
 
 
 def _add_case(suite: Element, one: Case) -> None:
-    case = SubElement(suite, "testcase", classname=plain(one.quantity), name=plain(one.mark.name), time="0")
+    case = SubElement(
+        suite, "testcase", classname=plain(one.quantity), name=plain(one.mark.name), time="0"
+    )
     if one.verdict is None:
         SubElement(case, "failure", message=one.mark.rule, type="missing")
         return

@@ -39,7 +39,14 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(
-        ["student", "points", "most", *(cell(plain(name)) for name in quantities), *_AFTER_POINTS, *_ORIGIN]
+        [
+            "student",
+            "points",
+            "most",
+            *(cell(plain(name)) for name in quantities),
+            *_AFTER_POINTS,
+            *_ORIGIN,
+        ]
     )
     for report, sheet in zip(reports, marks, strict=True):
         by_quantity = {mark.name: points(mark.points) for mark in sheet.quantities}

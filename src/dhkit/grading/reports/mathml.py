@@ -33,7 +33,12 @@ def mathml(latex: str) -> str | None:
     """
     from latex2mathml.converter import convert
 
-    if not latex.strip() or len(latex) > BOUNDS.converted_characters or "<" in latex or "&lt" in latex:
+    if (
+        not latex.strip()
+        or len(latex) > BOUNDS.converted_characters
+        or "<" in latex
+        or "&lt" in latex
+    ):
         return None
     try:
         root = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
@@ -47,7 +52,9 @@ def _copy_harmless(element: Element, parent: Element | None) -> Element:
     tag = _NAMESPACE.sub("", str(element.tag))
     tag = tag if _ELEMENTS.fullmatch(tag) else "mrow"
     allowed = {
-        key: value for key, value in element.attrib.items() if _ATTRIBUTES.fullmatch(key) and _VALUE.fullmatch(value)
+        key: value
+        for key, value in element.attrib.items()
+        if _ATTRIBUTES.fullmatch(key) and _VALUE.fullmatch(value)
     }
     copy = Element(tag, allowed) if parent is None else SubElement(parent, tag, allowed)
     copy.text = html.unescape(element.text or "")

@@ -43,11 +43,17 @@ def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
     if level == "full":
         return report
     hints = level == "hint"
-    diagnosis = (Diagnosis(None, one.hint, one.where, one.entries, one.hint) for one in report.diagnosis if one.hint)
+    diagnosis = (
+        Diagnosis(None, one.hint, one.where, one.entries, one.hint)
+        for one in report.diagnosis
+        if one.hint
+    )
     entries = []
     for entry in report.entries:
         shown = replace(entry, difference=None, difference_latex="", witness=None)
-        if not (hints and entry.verdict.passes):  # the statement on a wrong entry may say by how much it is wrong
+        if not (
+            hints and entry.verdict.passes
+        ):  # the statement on a wrong entry may say by how much it is wrong
             shown = replace(shown, statement="")
         entries.append(shown if hints else replace(shown, latex="", follows=""))
     return replace(
@@ -107,7 +113,9 @@ def remark_lines(report: GradeReport) -> Iterator[str]:
 def witness_sentence(witness: Witness) -> str:
     """Return the state at which an answer and the truth differ, and both values there."""
     state = ", ".join(f"{plain(name, 40)} = {value:.6g}" for name, value in witness.state.items())
-    answer, truth = ("has no value" if x is None else f"{x:.6g}" for x in (witness.answer, witness.truth))
+    answer, truth = (
+        "has no value" if x is None else f"{x:.6g}" for x in (witness.answer, witness.truth)
+    )
     return f"{f'at {state}' if state else 'everywhere'}: answer {answer}, truth {truth}"
 
 
@@ -128,7 +136,9 @@ def provenance(report: GradeReport) -> str:
 
 def own_robot_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
     """Yield a warning if sheets named the robots they were judged by: a student may choose an easier robot."""
-    own = sorted({plain(report.robot, 40) for report in reports if report.own_robot and report.robot})
+    own = sorted(
+        {plain(report.robot, 40) for report in reports if report.own_robot and report.robot}
+    )
     if own:
         yield f"each sheet named its own robot ({', '.join(own)}): give the task's by --robot or --task"
 

@@ -37,7 +37,9 @@ def terminal_report(report: GradeReport, marks: Marks, read: bool = False) -> Re
     read
         Whether to show, before the verdicts, how each entry was read.
     """
-    title = ", ".join(plain(part) for part in (report.student, report.sheet or "", report.robot) if part)
+    title = ", ".join(
+        plain(part) for part in (report.student, report.sheet or "", report.robot) if part
+    )
     verdict = (sentences.summary(report, marks), _STYLES[report.verdict])
     parts: list[RenderableType] = [Text.assemble((title or "answers", "bold"), ": ", verdict)]
     if read:
@@ -90,7 +92,13 @@ def _mistake_bars(counts: Sequence[tuple[str, int]], sheets: int) -> Iterator[Re
     yield Text(f"\nmistakes, and on how many of {sheets} sheets", style="bold")
     table = Table.grid(padding=(0, 2, 0, 0))
     for name, count in counts:
-        bar = ProgressBar(total=sheets, completed=count, width=_BAR_COLUMNS, complete_style="red", finished_style="red")
+        bar = ProgressBar(
+            total=sheets,
+            completed=count,
+            width=_BAR_COLUMNS,
+            complete_style="red",
+            finished_style="red",
+        )
         table.add_row(Text(plain(name, 60)), Text(str(count)), bar)
     yield table
 
@@ -98,5 +106,7 @@ def _mistake_bars(counts: Sequence[tuple[str, int]], sheets: int) -> Iterator[Re
 def _table(*headings: str) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in headings:
-        table.add_column(Text(heading), justify="right" if heading == "points" else "left", overflow="fold")
+        table.add_column(
+            Text(heading), justify="right" if heading == "points" else "left", overflow="fold"
+        )
     return table

@@ -105,7 +105,9 @@ class Shoulder:
         return hypot(self.r - hypot(x, offset), rise)
 
 
-def _shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tuple[Shoulder, Shoulder]:
+def _shoulders(
+    point: Vector, offset: SX, scale: SX, reach: SX, free: Pair
+) -> tuple[Shoulder, Shoulder]:
     """Return the two positions of joint 1 that give a point the coordinate v = ``offset``: point in front, then behind.
 
     The point has coordinates (x, v) with joint 1 at zero and (X, offset) in the plane at q1. Joint 1 turns v towards x,
@@ -149,7 +151,9 @@ def _shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> t
     return side(front), side(-front)
 
 
-def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) -> tuple[Shoulder, Shoulder]:
+def ordered_shoulders(
+    p: Mapping[str, SX], position: Vector, pose: PoseSymbols
+) -> tuple[Shoulder, Shoulder]:
     """Return the left shoulder first: seen from axis 1 towards the wrist, the arm's plane passes on the left.
 
     Without lateral offset there is no left and right; the shoulder in front then comes first.
@@ -162,7 +166,9 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
 
     def selected(a: Shoulder, b: Shoulder) -> Shoulder:
         """Return a where the shoulder at the back is the left one, else b; they differ in q1 and x only."""
-        return replace(a, q1=select_pair(back_is_left, a.q1, b.q1), x=if_else(back_is_left, a.x, b.x))
+        return replace(
+            a, q1=select_pair(back_is_left, a.q1, b.q1), x=if_else(back_is_left, a.x, b.x)
+        )
 
     return selected(back, front), selected(front, back)
 

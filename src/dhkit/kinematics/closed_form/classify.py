@@ -14,7 +14,9 @@ from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Family, Fit
 FAMILIES = (
     Family("elbow_wrist", spherical_wrist.elbow_fit, spherical_wrist.elbow_formulas),
     Family("slide_wrist", spherical_wrist.slide_fit, spherical_wrist.slide_formulas),
-    Family("three_parallel", three_parallel.three_parallel_fit, three_parallel.three_parallel_formulas),
+    Family(
+        "three_parallel", three_parallel.three_parallel_fit, three_parallel.three_parallel_formulas
+    ),
     Family("yaw_three", turret.yaw_three_fit, turret.yaw_three_formulas),
     Family("yaw_two", turret.yaw_two_fit, turret.yaw_two_formulas),
     Family("pan_tilt", turret.pan_tilt_fit, turret.pan_tilt_formulas),

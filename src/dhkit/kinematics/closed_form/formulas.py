@@ -90,7 +90,9 @@ def rotate(R: SX, vector: tuple[SX, SX, SX]) -> tuple[SX, SX, SX]:
     )
 
 
-def weighted_sum(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
+def weighted_sum(
+    weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]
+) -> tuple[SX, SX, SX]:
     """Return the sum of vectors times their weights."""
     x: SX = 0
     y: SX = 0

@@ -35,7 +35,9 @@ def nearest_wrist_distance(fit: Fit, T: Array) -> Array:
         Poses of the tool in the world that are out of reach, shape (N, 4, 4).
     """
     if len(T) > _CHUNK:
-        return np.concatenate([nearest_wrist_distance(fit, T[k : k + _CHUNK]) for k in range(0, len(T), _CHUNK)])
+        return np.concatenate(
+            [nearest_wrist_distance(fit, T[k : k + _CHUNK]) for k in range(0, len(T), _CHUNK)]
+        )
     T_plane_world = np.asarray(fit.parameters["T_plane_world"])
     T_tool_wrist = np.asarray(fit.parameters["T_tool_wrist"])
     a1 = float(np.asarray(fit.parameters["a1"]))
@@ -84,7 +86,9 @@ def _distance_of_circle(r: Array, u: Array, a1: float, offset: float, rho: float
     return np.asarray(result)
 
 
-def _minimum_near(start: Array, step: float, r: Array, u: Array, a1: float, offset: float, rho: float) -> Array:
+def _minimum_near(
+    start: Array, step: float, r: Array, u: Array, a1: float, offset: float, rho: float
+) -> Array:
     """Return the smallest distances found by Newton's method within a step of directions ``start``, all (M,)."""
     phi = start
     smallest = np.full(len(start), np.inf)

@@ -133,14 +133,20 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         upright = p["up"] > 0
         other = 1 - side
         qa = add_angles(select_pair(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
-        qb = add_angles(select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
+        qb = add_angles(
+            select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0
+        )
         qc = add_angles(add_angles(rho, qa, -1.0), qb, -1.0)
 
         angles = iter((qa, qb, qc))
         joints = []
         for kind, sense in zip(kinds, p["senses"], strict=True):
             joints.append(sense * rise if kind == "P" else _sensed(next(angles), sense))
-        branches.append(Branch(tuple(joints), miss=hypot(arm.miss, off), elbow=arm.straight, clamped=arm.clamped))
+        branches.append(
+            Branch(
+                tuple(joints), miss=hypot(arm.miss, off), elbow=arm.straight, clamped=arm.clamped
+            )
+        )
     return branches
 
 

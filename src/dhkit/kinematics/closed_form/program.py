@@ -25,7 +25,14 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
     """
     symbols = ca.SX.sym("p", len(fit.vector()))
     limits = ca.SX.sym("limits", 2 * len(prismatic))
-    return _graph(family, fit, prismatic, fit.named(symbols), limits, {"parameters": ca.vertcat(symbols, limits)})
+    return _graph(
+        family,
+        fit,
+        prismatic,
+        fit.named(symbols),
+        limits,
+        {"parameters": ca.vertcat(symbols, limits)},
+    )
 
 
 def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
@@ -55,7 +62,9 @@ def _graph(
     )
     branches = family.formulas(named, pose)
     if len(branches) != len(fit.branches):
-        raise ValueError(f"{family.name}: {len(branches)} branches with {len(fit.branches)} names; expected as many")
+        raise ValueError(
+            f"{family.name}: {len(branches)} branches with {len(fit.branches)} names; expected as many"
+        )
 
     valid = []
     q = []
@@ -118,7 +127,10 @@ def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
     """Return the sum of the flags of a branch, as the integer that :class:`IKFlag` makes of them."""
     inside = reduce(
         ca.logic_and,
-        (_inside(x, limits[2 * i], limits[2 * i + 1], prismatic[i]) for i, x in enumerate(branch.q)),
+        (
+            _inside(x, limits[2 * i], limits[2 * i + 1], prismatic[i])
+            for i, x in enumerate(branch.q)
+        ),
     )
     conditions = {
         IKFlag.shoulder: branch.shoulder,

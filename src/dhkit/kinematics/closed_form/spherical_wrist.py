@@ -45,7 +45,12 @@ from dhkit.kinematics.closed_form.formulas import (
     unit_pair,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters, link_range
-from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, wrist_axes, wrist_parameters
+from dhkit.kinematics.closed_form.wrist import (
+    ill_determined,
+    joints_5_and_6,
+    wrist_axes,
+    wrist_parameters,
+)
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,9 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 miss=hypot(shoulder.miss, elbow.miss),
                 elbow=elbow.singular,
                 clamped=logic_or(shoulder.clamped, elbow.clamped),
-                distance=shoulder.shortfall(p["offset"], p["a1"] + elbow.nearest[0], T.position[1] - elbow.nearest[1]),
+                distance=shoulder.shortfall(
+                    p["offset"], p["a1"] + elbow.nearest[0], T.position[1] - elbow.nearest[1]
+                ),
             )
             branches += _with_wrist(p, T.rotation, region, pose)
     return branches

@@ -55,7 +55,9 @@ _ROTATION_SLACK = 1e-12
 
 def three_parallel_fit(axes: Axes) -> Fit | None:
     """Recognize axes 2, 3 and 4 parallel, 1 and 5 perpendicular to them, and 5 and 6 meeting at right angles."""
-    if axes.kinds != "RRRRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
+    if axes.kinds != "RRRRRR" or not (
+        axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)
+    ):
         return None
     if not (axes.perpendicular(4, 5) and axes.perpendicular(5, 6)):
         return None
@@ -70,7 +72,8 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
     end = plane.coordinates(meeting)
     own: dict[str, Parameter] = {
         "offset": axes.snapped(end[2]),
-        "lever": end[:2] - fourth[:2],  # (x, u) from axis 4 to the meeting point of axes 5 and 6 at zero, m
+        "lever": end[:2]
+        - fourth[:2],  # (x, u) from axis 4 to the meeting point of axes 5 and 6 at zero, m
         "sense4": axes.sense(2, 4),
     }
     return Fit(
@@ -124,7 +127,9 @@ def _wrists(
     )
 
 
-def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, pose: PoseSymbols) -> Pair:
+def _within_reach(
+    p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, pose: PoseSymbols
+) -> Pair:
     """Return rho, or the nearest one for which axis 4 is in reach of the two links, if that hardly rotates the tool.
 
     Near the wrist's singularity rho is ill determined: changing it rotates the tool only ``swing`` times as much. The

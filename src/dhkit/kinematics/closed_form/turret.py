@@ -46,7 +46,8 @@ def pan_tilt_fit(axes: Axes) -> Fit | None:
         return None
     return Fit(
         geometry="pan and tilt: axes 1 and 2 at right angles",
-        parameters=_common(axes, plane) | {"offset": axes.snapped(tool[2]), "a1": second[0], "lever": as_pair(*lever)},
+        parameters=_common(axes, plane)
+        | {"offset": axes.snapped(tool[2]), "a1": second[0], "lever": as_pair(*lever)},
         branches=branch_names(axes.snapped(tool[2])),
         coordinates=("azimuth", "elevation"),
     )
@@ -102,7 +103,9 @@ def yaw_two_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 def yaw_three_fit(axes: Axes) -> Fit | None:
     """Recognize a turntable with three parallel joints; the tool's z axis points, or its x axis if z is sideways."""
-    if axes.kinds != "RRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
+    if axes.kinds != "RRRR" or not (
+        axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)
+    ):
         return None
     plane = ArmPlane.of(axes)
     links = link_parameters(axes, plane, axes.point(4))

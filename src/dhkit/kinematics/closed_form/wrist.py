@@ -25,7 +25,9 @@ from dhkit.kinematics.closed_form.formulas import (
 )
 
 
-def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -> dict[str, Parameter]:
+def wrist_parameters(
+    axes: Axes, plane: ArmPlane, first: Array, centre: Array
+) -> dict[str, Parameter]:
     """Return the parameters of the arm's plane and wrist: positions, and directions of the wrist's axes at zero.
 
     Parameters
@@ -88,7 +90,9 @@ def ill_determined(pose: PoseSymbols) -> SX:
     return 1.0 + ERROR_OVER_DEFECT / MIN_DIRECTION * pose.noise
 
 
-def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
+def joints_5_and_6(
+    p: Mapping[str, SX], wrist: Wrist, roll: Pair
+) -> tuple[tuple[SX, SX], tuple[SX, SX]]:
     """Return q5 and q6 without flip (joint 5 positive), then with flip, where ``roll`` is larger by pi.
 
     Both follow from the rotation that remains after the roll about the first axis, so that any roll closes the pose.

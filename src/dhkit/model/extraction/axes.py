@@ -183,7 +183,12 @@ def angle_costs(angles: Array) -> Array:
     is_oblique = np.abs(angles - quarter * (np.pi / 2)) > ZERO
     is_straight = ~is_oblique & (np.abs(quarter) == 2)
     is_negative = (angles < 0) & ~is_straight
-    costs = _ENTRY_COST + _OBLIQUE_COST * is_oblique + _STRAIGHT_COST * is_straight + _NEGATIVE_COST * is_negative
+    costs = (
+        _ENTRY_COST
+        + _OBLIQUE_COST * is_oblique
+        + _STRAIGHT_COST * is_straight
+        + _NEGATIVE_COST * is_negative
+    )
     return np.where(np.abs(angles) <= ZERO, 0.0, costs)
 
 
@@ -200,7 +205,9 @@ def angle_about(axis: Array, start: Array, end: Array) -> Array:
     return np.where(angles <= -np.pi + 1e-15, np.pi, angles)
 
 
-def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Callable[[Normal], Choice]) -> Path:
+def tidiest_normals(
+    axes: Axes, begin: Callable[[Normal], Choice], finish: Callable[[Normal], Choice]
+) -> Path:
     """Return the normals, and the ends, of the table with the lowest cost.
 
     Parameters
@@ -333,7 +340,9 @@ def nearest_points(point: Array, z: Array, other: Array, z_other: Array) -> tupl
     return point + s * z, other + s_other * z_other
 
 
-def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous: Array | None) -> list[Normal]:
+def _parallel_normals(
+    axes: Axes, i: int, on_axis: Array, line: Array, previous: Array | None
+) -> list[Normal]:
     """Return normals between parallel axes, at known points' heights; of coincident ones in known directions."""
     z = axes.directions[i]
 

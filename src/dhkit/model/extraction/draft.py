@@ -59,7 +59,11 @@ class Rounding:
 
     def length(self, value: float) -> Expression:
         """Return a length, m."""
-        return exact(float(value) + 0.0 if self.decimals is None else round(float(value), self.decimals) + 0.0)
+        return exact(
+            float(value) + 0.0
+            if self.decimals is None
+            else round(float(value), self.decimals) + 0.0
+        )
 
     def angle(self, value: float) -> Expression:
         """Return an angle, rad; one within the last decimal of a multiple of 15 degrees is that multiple."""
@@ -96,7 +100,10 @@ class Rounding:
         moments = Inertia.of_tensor(inertia)
         if self.decimals is not None and largest:
             places = _SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(largest))
-            rounded = {key: round(float(inertia[place]), places) + 0.0 for key, place in INERTIA_PLACES.items()}
+            rounded = {
+                key: round(float(inertia[place]), places) + 0.0
+                for key, place in INERTIA_PLACES.items()
+            }
             moments = Inertia(**{key: exact(moment) for key, moment in rounded.items()})
         weight = mass if self.decimals is None else float(f"{mass:.{_SIGNIFICANT_DIGITS}g}")
         lowest, _, highest = np.linalg.eigvalsh(inertia)
@@ -139,7 +146,9 @@ class Draft:
         )
         base_body = self._body(0, frames[0], rounding)
         base_shapes = self._placed_shapes(0, frames[0])
-        base = replace(bare.base, shapes=base_shapes, body=base_body if base_body.mass != ZERO else None)
+        base = replace(
+            bare.base, shapes=base_shapes, body=base_body if base_body.mass != ZERO else None
+        )
         return replace(bare, joints=joints, base=base, tool=Tool(rounding.placement(tool_pose)))
 
     def _without_bodies(self, table: Table, rounding: Rounding) -> Description:
@@ -194,7 +203,10 @@ class Draft:
     def _placed_shapes(self, i: int, T_base_frame: Array) -> tuple[Shape, ...]:
         to_frame = np.linalg.inv(T_base_frame)
         rounding = Rounding(_SHAPE_DECIMALS)
-        return tuple(replace(shape, placement=rounding.placement(to_frame @ T)) for shape, T in self.shapes[i])
+        return tuple(
+            replace(shape, placement=rounding.placement(to_frame @ T))
+            for shape, T in self.shapes[i]
+        )
 
 
 def _joint(name: str, joint: UrdfJoint, row: Array, rounding: Rounding) -> Joint:
@@ -221,7 +233,10 @@ def _configurations(chain: Chain) -> Named[tuple[Expression, ...]]:
     outside = [limit for limit in limits if limit is not None and not limit[0] <= 0 <= limit[1]]
     if not outside:
         return Named({"zero": (ZERO,) * len(limits)})
-    middle = ((exact(limit[0]) + exact(limit[1])) / 2 if limit in outside and limit else ZERO for limit in limits)
+    middle = (
+        (exact(limit[0]) + exact(limit[1])) / 2 if limit in outside and limit else ZERO
+        for limit in limits
+    )
     return Named({"middle": tuple(middle)})
 
 

@@ -97,7 +97,9 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
 
     # In the normal's axes the base's x axis is (c, -s, 0): it is parallel to the part of t across z.
     across = R.T @ t
-    thetas += _and_opposite(-np.arctan2(across[1], across[0]))  # the base's x axis points at the first axis
+    thetas += _and_opposite(
+        -np.arctan2(across[1], across[0])
+    )  # the base's x axis points at the first axis
     return min(_modified_starts(R, t, z, thetas), key=itemgetter(0))
 
 
@@ -112,15 +114,21 @@ def _modified_starts(R: Array, t: Array, z: Array, thetas: list[float]) -> Itera
         is_about_x = abs(pitch) <= ZERO and abs(yaw) <= ZERO
         alpha = float(roll) if is_about_x else 0.0
         base_turns = angle_costs(np.array([[0.0 if is_about_x else roll, pitch, yaw]]))
-        turns = float(_outside_costs(base_turns)[0]) + float(angle_costs(np.array([alpha, theta])).sum())
+        turns = float(_outside_costs(base_turns)[0]) + float(
+            angle_costs(np.array([alpha, theta])).sum()
+        )
         x = R_base[:, 0]
         for a, d in _zeroing_pairs(t, x, z):
             origin = t - a * x - d * z
-            lengths = length_costs(np.array([a, d])).sum() + _outside_costs(length_costs(origin[None]))[0]
+            lengths = (
+                length_costs(np.array([a, d])).sum() + _outside_costs(length_costs(origin[None]))[0]
+            )
             yield turns + float(lengths), EndRow(float(theta), d, alpha, a)
 
 
-def last_row(convention: Convention, normal: Normal, z: Array, T_base_tip: Array, with_theta: bool = True) -> Choice:
+def last_row(
+    convention: Convention, normal: Normal, z: Array, T_base_tip: Array, with_theta: bool = True
+) -> Choice:
     """Return the cheapest last row of a table with its cost, for its last normal and last axis in the base.
 
     z is the axis' unit vector, shape (3,), T_base_tip the tip's pose, shape (4, 4); lengths are in units of about the
@@ -145,7 +153,9 @@ def _modified_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
     turns = _in_last_row(angle_costs(thetas)) + angle_costs(_roll_pitch_yaw(back @ R)).sum(axis=-1)
     for d in (0.0, float(t[2])) if with_theta else (0.0,):
         origin = back @ t - np.array([0.0, 0.0, d])
-        costs = turns + _in_last_row(length_costs(np.array([d])))[0] + length_costs(origin).sum(axis=-1)
+        costs = (
+            turns + _in_last_row(length_costs(np.array([d])))[0] + length_costs(origin).sum(axis=-1)
+        )
         k = int(np.argmin(costs))
         yield float(costs[k]), EndRow(float(thetas[k]), d)
 
@@ -164,8 +174,12 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
     if with_theta:
         thetas += _and_opposite(np.arctan2(R[1, 0], R[0, 0]))  # the tool's yaw is 0 if alpha is
         thetas += _quarters(np.arctan2(t[1], t[0]))  # p_y is 0, or p_x, which is the entry a
-        thetas += _and_opposite(np.arctan2(R[0, 2], -R[1, 2]))  # the tool rotates about x and then z
-        thetas += _and_opposite(np.arctan2(-R[0, 1], R[1, 1]))  # the tool rotates about x and then y
+        thetas += _and_opposite(
+            np.arctan2(R[0, 2], -R[1, 2])
+        )  # the tool rotates about x and then z
+        thetas += _and_opposite(
+            np.arctan2(-R[0, 1], R[1, 1])
+        )  # the tool rotates about x and then y
     for theta in thetas:
         back = _rotations(2, np.array([-theta]))[0]
         P = back @ R
@@ -179,18 +193,29 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
         angles += _and_opposite(np.arctan2(P[2, 1], P[1, 1]))  # its roll
         alphas = np.array([*angles, *_quarters(np.arctan2(p[2], p[1]))])
         tool_turns = _roll_pitch_yaw(_rotations(0, -alphas) @ P)
-        turns = float(angle_costs(np.array([theta]))[0]) + angle_costs(alphas) + _outside_costs(angle_costs(tool_turns))
+        turns = (
+            float(angle_costs(np.array([theta]))[0])
+            + angle_costs(alphas)
+            + _outside_costs(angle_costs(tool_turns))
+        )
         costs = turns + float(length_costs(p[:1])[0])
 
         c = np.cos(alphas)
         s = np.sin(alphas)
         with np.errstate(divide="ignore", invalid="ignore"):
-            offsets = [np.zeros_like(alphas), np.full_like(alphas, p[2]), p[2] - s / c * p[1], p[2] + c / s * p[1]]
+            offsets = [
+                np.zeros_like(alphas),
+                np.full_like(alphas, p[2]),
+                p[2] - s / c * p[1],
+                p[2] + c / s * p[1],
+            ]
         for d in offsets if with_theta else offsets[:1]:
             d = np.where(np.isfinite(d) & (np.abs(d) < _MAX_OFFSET), d, 0.0)
             y = c * p[1] + s * (p[2] - d)
             z = -s * p[1] + c * (p[2] - d)
-            total = costs + length_costs(d) + _outside_costs(length_costs(np.stack([y, z], axis=-1)))
+            total = (
+                costs + length_costs(d) + _outside_costs(length_costs(np.stack([y, z], axis=-1)))
+            )
             k = int(np.argmin(total))
             yield float(total[k]), EndRow(float(theta), float(d[k]), float(alphas[k]), float(p[0]))
 
@@ -223,7 +248,9 @@ def _roll_pitch_yaw(R: Array) -> Array:
     is_locked = level < 1e-12
     pitch = np.arctan2(-R[:, 2, 0], level)
     yaw = np.where(is_locked, 0.0, np.arctan2(R[:, 1, 0], R[:, 0, 0]))
-    roll = np.where(is_locked, np.arctan2(-R[:, 1, 2], R[:, 1, 1]), np.arctan2(R[:, 2, 1], R[:, 2, 2]))
+    roll = np.where(
+        is_locked, np.arctan2(-R[:, 1, 2], R[:, 1, 1]), np.arctan2(R[:, 2, 1], R[:, 2, 2])
+    )
     return np.stack([roll, pitch, yaw], axis=-1)
 
 

@@ -22,7 +22,13 @@ from dhkit.model.bounds import BOUNDS
 from dhkit.model.extraction.axes import Axes
 from dhkit.model.extraction.draft import UNROUNDED, Draft, Rounding, allowed_name
 from dhkit.model.extraction.residual import Original, Residual
-from dhkit.model.extraction.table import Table, chain_axes, nearly_parallel, tidiest_table, with_parallel_axes
+from dhkit.model.extraction.table import (
+    Table,
+    chain_axes,
+    nearly_parallel,
+    tidiest_table,
+    with_parallel_axes,
+)
 from dhkit.model.mesh_paths import MeshFinder
 from dhkit.model.urdf_chain import Chain, Side, chain_of, only_tip, read_chain
 from dhkit.model.urdf_reader import read_urdf
@@ -75,11 +81,15 @@ class Extraction:
         return repr_line("Extraction", self.description.name, text)
 
     def _repr_html_(self) -> str:
-        rounding = "as computed" if self.decimals is None else f"rounded to {self.decimals} decimals"
+        rounding = (
+            "as computed" if self.decimals is None else f"rounded to {self.decimals} decimals"
+        )
         facts = [("residual", str(self.residual)), ("numbers", rounding)]
         lines = html_lines([*self.changes, *self.notes])
         title = f"{self.description.name} from a URDF"
-        return html_block(title, html_table((), facts), DHTable.of(self.description)._repr_html_(), lines)
+        return html_block(
+            title, html_table((), facts), DHTable.of(self.description)._repr_html_(), lines
+        )
 
 
 def extract_dh(
@@ -129,9 +139,13 @@ def extract_dh(
     if convention not in known:
         raise ModelError(f"convention is {convention!r}; expected one of {', '.join(known)}")
     chain = read_chain(path, base, tip, side=side, as_designed=as_designed)
-    if chain.tree.changes:  # the file as written is checked too: changes must not hide a wrong reading
+    if (
+        chain.tree.changes
+    ):  # the file as written is checked too: changes must not hide a wrong reading
         Original(read_chain(path, chain.base, chain.tip, side=side)).check_reading()
-    return extracted(chain, convention=Convention(convention), exact=exact, package_dirs=package_dirs, name=name)
+    return extracted(
+        chain, convention=Convention(convention), exact=exact, package_dirs=package_dirs, name=name
+    )
 
 
 def extracted(
@@ -150,14 +164,22 @@ def extracted(
         The chain makes no description.
     """
     if not 1 <= len(chain.joints) <= ROBOT_BOUNDS.joints:
-        raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {ROBOT_BOUNDS.joints}")
+        raise ModelError(
+            f"{chain.path}: {len(chain.joints)} joints; expected 1 to {ROBOT_BOUNDS.joints}"
+        )
     notes = [*chain.notes]
     original = Original(chain)
     changes = chain.tree.changes
     if not changes:
         original.check_reading()
     meshes = MeshFinder(chain.path, package_dirs)
-    draft = Draft(chain, convention, _shapes(chain, meshes, notes), meshes.mesh_folder, name or _robot_name(chain))
+    draft = Draft(
+        chain,
+        convention,
+        _shapes(chain, meshes, notes),
+        meshes.mesh_folder,
+        name or _robot_name(chain),
+    )
     try:
         table, turned = _best_table(chain, convention, draft, original, notes, exact=exact)
         description, residual, decimals = _rounded(draft, table, original, turned)
@@ -167,11 +189,15 @@ def extracted(
         notes.append("M and g not compared with the file: Pinocchio is not installed")
 
     if changes:
-        notes.append(f"read as designed: {len(changes)} numbers; the file as written differs by {residual}")
+        notes.append(
+            f"read as designed: {len(changes)} numbers; the file as written differs by {residual}"
+        )
     else:
         notes.append(f"differs from the file by {residual}")
         lengths = np.concatenate([description.numbers.a, description.numbers.d])
-        if recommendation := _smaller_as_designed(chain, convention, int(np.count_nonzero(lengths))):
+        if recommendation := _smaller_as_designed(
+            chain, convention, int(np.count_nonzero(lengths))
+        ):
             notes.append(recommendation)
     description = replace(description, notes="\n".join(notes)[: BOUNDS.notes_characters])
     return Extraction(description, residual, tuple(notes), changes, decimals, turned)
@@ -184,7 +210,9 @@ def _robot_name(chain: Chain) -> str:
     return allowed_name(name if is_only_chain else f"{name}_{chain.tip}", "robot")
 
 
-def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[tuple[Shape, Array], ...], ...]:
+def _shapes(
+    chain: Chain, meshes: MeshFinder, notes: list[str]
+) -> tuple[tuple[tuple[Shape, Array], ...], ...]:
     """Return the shapes of each group of links with their poses in the base; unreadable meshes are noted."""
     link_names = itertools.chain.from_iterable(chain.groups)
     has_visuals = any(chain.tree.links[link].visuals for link in link_names)
@@ -221,7 +249,11 @@ def _link_shapes(
             except DhkitError as error:
                 # Folders are left out of paths: others read the notes of a robot file.
                 is_root = folder == folder.parent
-                text = str(error) if is_root else str(error).replace(f"{folder}/", "").replace(str(folder), folder.name)
+                text = (
+                    str(error)
+                    if is_root
+                    else str(error).replace(f"{folder}/", "").replace(str(folder), folder.name)
+                )
                 left_out.append(f"link {name!r}: {text}{SHAPE_LEFT_OUT}")
                 continue
             geometry = replace(geometry, path=path)
@@ -239,7 +271,13 @@ class _Candidate(NamedTuple):
 
 
 def _best_table(
-    chain: Chain, convention: Convention, draft: Draft, original: Original, notes: list[str], *, exact: bool
+    chain: Chain,
+    convention: Convention,
+    draft: Draft,
+    original: Original,
+    notes: list[str],
+    *,
+    exact: bool,
 ) -> tuple[Table, float]:
     """Return the tidiest table, and the sum of the angles by which axes were turned to be parallel, rad.
 
@@ -255,7 +293,9 @@ def _best_table(
         if made:
             table = tidiest_table(axes, convention)
             error = original.residual(draft.description(table, UNROUNDED)).tool
-            names = ", ".join(f"{one.first} and {one.first + 1} ({one.angle:.1e} rad)" for one in made)
+            names = ", ".join(
+                f"{one.first} and {one.first + 1} ({one.angle:.1e} rad)" for one in made
+            )
             notes.append(
                 f"axes that are parallel to within the rounding of the file's angles were made parallel: {names};"
                 f" the tool differs by up to {error:.1e} m or rad"
@@ -310,8 +350,15 @@ def _smaller_as_designed(chain: Chain, convention: Convention, lengths: int) -> 
 def _axes(chain: Chain) -> Axes:
     """Return the joint axes of a chain in its base, with all joints at zero."""
     poses = np.array([chain.zero_poses[joint.child] for joint in chain.joints])
-    directions = np.array([T[:3, :3] @ joint.axis for T, joint in zip(poses, chain.joints, strict=True)])
-    return chain_axes(poses, directions, [joint.is_prismatic for joint in chain.joints], chain.zero_poses[chain.tip])
+    directions = np.array(
+        [T[:3, :3] @ joint.axis for T, joint in zip(poses, chain.joints, strict=True)]
+    )
+    return chain_axes(
+        poses,
+        directions,
+        [joint.is_prismatic for joint in chain.joints],
+        chain.zero_poses[chain.tip],
+    )
 
 
 def _roundings(chain: Chain) -> list[float]:
@@ -329,7 +376,9 @@ def _roundings(chain: Chain) -> list[float]:
     return found[1:]
 
 
-def _rounded(draft: Draft, table: Table, original: Original, turned: float) -> tuple[Description, Residual, int | None]:
+def _rounded(
+    draft: Draft, table: Table, original: Original, turned: float
+) -> tuple[Description, Residual, int | None]:
     """Return the description with the shortest numbers that keep tool, M and g.
 
     Axes that were turned by angles with the sum ``turned``, rad, move the tool by as much times the arm's size.
@@ -339,7 +388,9 @@ def _rounded(draft: Draft, table: Table, original: Original, turned: float) -> t
     # A turn about an axis that is off by an angle is off by up to twice the angle, at a lever of up to twice the size.
     allowed = (_MAX_TABLE_ERROR + 4 * turned) * max(original.size, 1.0)
     if not original.chain.tree.changes and error.tool > allowed:
-        raise ModelError(f"no table within {_MAX_TABLE_ERROR:g} of the file: the tool differs by {error.tool:.2g}")
+        raise ModelError(
+            f"no table within {_MAX_TABLE_ERROR:g} of the file: the tool differs by {error.tool:.2g}"
+        )
 
     # With changes as designed or nearly parallel axes the error may exceed the bounds; rounding may then double it.
     max_tool_error = _MAX_TOOL_ROUNDING_ERROR * min(original.size, 1.0)

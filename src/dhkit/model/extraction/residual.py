@@ -73,7 +73,9 @@ class Original:
         self.tool = np.array(list(self._tools()))
         steps = [float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in chain.joints]
         self.size = max(float(np.abs(self.tool[:, :3, 3]).max()), *steps) or 1.0
-        self.M, self.g = _dynamics(self.model, self.q) if self.model is not None else (np.zeros(0), np.zeros(0))
+        self.M, self.g = (
+            _dynamics(self.model, self.q) if self.model is not None else (np.zeros(0), np.zeros(0))
+        )
 
     def check_reading(self) -> None:
         """Refuse a file that Pinocchio reads as another robot than dhkit.
@@ -86,7 +88,9 @@ class Original:
         difference = np.abs(np.array([tip_in_base(self.chain, q) for q in self.q]) - self.tool)
         difference[:, :3, 3] /= max(self.size, 1.0)
         if (largest := difference.max()) > _MAX_READING_DIFFERENCE:
-            raise ModelError(f"{self.chain.path}: Pinocchio puts the tool {largest:.2g} away from where dhkit reads it")
+            raise ModelError(
+                f"{self.chain.path}: Pinocchio puts the tool {largest:.2g} away from where dhkit reads it"
+            )
 
     def residual(self, description: Description) -> Residual:
         """Return the differences of a description's tool, M and g from the URDF's."""

@@ -11,7 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit.description import Array, Convention
-from dhkit.model.extraction.axes import Axes, Normal, Path, angle_about, nearest_points, tidiest_normals
+from dhkit.model.extraction.axes import (
+    Axes,
+    Normal,
+    Path,
+    angle_about,
+    nearest_points,
+    tidiest_normals,
+)
 from dhkit.model.extraction.ends import first_row, frame, last_row, screw
 
 _MIN_SKEW_SINE = 1e-6
@@ -90,7 +97,9 @@ class MadeParallel(NamedTuple):
     """Angle between them in the file, rad."""
 
 
-def with_parallel_axes(axes: Axes, roundings: Sequence[float]) -> tuple[Axes, tuple[MadeParallel, ...]]:
+def with_parallel_axes(
+    axes: Axes, roundings: Sequence[float]
+) -> tuple[Axes, tuple[MadeParallel, ...]]:
     """Return the axes, those parallel that are parallel to within the rounding of a file's angles.
 
     Parameters
@@ -118,7 +127,9 @@ def tidiest_table(axes: Axes, convention: Convention) -> Table:
     longest = _longest_step(axes)
     unit = 2.0 ** round(math.log2(longest)) if longest > 0 else 1.0
     tip = _with_lengths_times(1 / unit, axes.T_base_tip)
-    table = _unit_table(replace(axes, points=axes.points / unit, feet=axes.feet / unit, T_base_tip=tip), convention)
+    table = _unit_table(
+        replace(axes, points=axes.points / unit, feet=axes.feet / unit, T_base_tip=tip), convention
+    )
     return Table(table.rows * [1.0, unit, unit, 1.0], _with_lengths_times(unit, table.T_base_first))
 
 
@@ -199,4 +210,6 @@ def _single_joint_paths(axes: Axes, convention: Convention) -> Iterator[Path]:
             normal = Normal(x, origin, origin)
             start_cost, start = first_row(convention, normal, z)
             end_cost, end = last_row(convention, normal, z, axes.T_base_tip, with_theta=False)
-            yield Path((normal,), start_cost + end_cost, start, end._replace(theta=start.theta, d=start.d))
+            yield Path(
+                (normal,), start_cost + end_cost, start, end._replace(theta=start.theta, d=start.d)
+            )

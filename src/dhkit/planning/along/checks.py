@@ -36,7 +36,9 @@ def require_path(description: LoadedArm, path: JointPath, limits: Limits) -> Non
     require_inside_limits(description, limits, path.q(s), f"the path at s = {s:.4g}")
     _require_no_jump(path, 1, "the path has a corner", "turns suddenly: plan to it and on from it")
     if np.isfinite(limits.jerk).any():
-        _require_no_jump(path, 2, "the path's curvature jumps", "would need infinite jerk, which is limited")
+        _require_no_jump(
+            path, 2, "the path's curvature jumps", "would need infinite jerk, which is limited"
+        )
     _require_regular(path)
     for where, end in (("the path's beginning", 0.0), ("the path's end", 1.0)):
         require_holdable(description, limits, path.q(end), where)
@@ -49,7 +51,9 @@ def _require_no_jump(path: JointPath, order: int, what: str, joint_does: str) ->
     if steps.size and steps.max() > JUMP_ROUNDING * np.abs(values).max():
         k, i = np.unravel_index(int(np.argmax(steps)), steps.shape)
         name = path.description.joints[i].name
-        raise PlanningError(f"{what} at s = {path.breaks[k + 1]:.4g}, where joint {name} {joint_does}")
+        raise PlanningError(
+            f"{what} at s = {path.breaks[k + 1]:.4g}, where joint {name} {joint_does}"
+        )
 
 
 def _require_regular(path: JointPath) -> None:
@@ -66,7 +70,9 @@ def _require_regular(path: JointPath) -> None:
     if steepness.max() > MAX_DERIVATIVE_RATIO * mean:
         k, j, i = np.unravel_index(int(np.argmax(np.abs(slopes))), slopes.shape)
         name = path.description.joints[i].name
-        raise PlanningError(f"the path is singular at s = {s[k, j]:.4g}: joint {name} turns ever faster there")
+        raise PlanningError(
+            f"the path is singular at s = {s[k, j]:.4g}: joint {name} turns ever faster there"
+        )
 
 
 def require_kept(program: PathProgram[Profile]) -> None:
@@ -99,12 +105,16 @@ def require_kept(program: PathProgram[Profile]) -> None:
             if limit == Limit.CLEARANCE:
                 where = f"the path at s = {s[k]:.4g}"
                 task.avoidance.require_gap(task.arm, q[k], where, task.avoidance.clearance)
-                raise PlanningError(f"{where}: the way to the next place leads too near to {task.avoidance.names}")
+                raise PlanningError(
+                    f"{where}: the way to the next place leads too near to {task.avoidance.names}"
+                )
             raise PlanningError(
                 f"{constraint.what} is exceeded by {100 * (use[k] - 1):.2g} % at s = {s[k]:.4g}, at any speed"
             )
     moves = np.abs(states.qs).max(axis=(0, 1)) > 0
-    limited = np.isfinite([task.limits.torque, task.limits.acceleration, task.limits.jerk]).any(axis=0)
+    limited = np.isfinite([task.limits.torque, task.limits.acceleration, task.limits.jerk]).any(
+        axis=0
+    )
     if task.objective.only_time and not (moves & limited).any():
         raise PlanningError(
             "nothing limits acceleration along the path: no joint that moves has a limit of it, of jerk or of torque"
@@ -123,4 +133,6 @@ def require_holdable_along(program: PathProgram[Profile]) -> None:
     states = program.states
     use = np.abs(states.g) / task.limits.torque
     end, k, _ = np.unravel_index(int(np.argmax(use)), use.shape)
-    require_holdable(task.loaded, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}")
+    require_holdable(
+        task.loaded, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}"
+    )

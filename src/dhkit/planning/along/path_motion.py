@@ -21,7 +21,13 @@ from dhkit.planning.certificate import Checker
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
 from dhkit.planning.plan_report import report_of
 from dhkit.planning.program import ProgressCall, Starts, Task, Work
-from dhkit.planning.request import PathKeywords, PathOptions, checked_constraints, checked_limits, smoothed
+from dhkit.planning.request import (
+    PathKeywords,
+    PathOptions,
+    checked_constraints,
+    checked_limits,
+    smoothed,
+)
 from dhkit.planning.search import TIME_SCALING_MARGIN, MotionSearch, PlannedMotion
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Trajectory
@@ -105,7 +111,9 @@ def along_path(
     work = chosen.work()
     check_whole("intervals", intervals, MIN_INTERVALS)
     if intervals > MAX_INTERVALS:
-        raise ValueError(f"intervals is {intervals!r}; expected a whole number from {MIN_INTERVALS} to {MAX_INTERVALS}")
+        raise ValueError(
+            f"intervals is {intervals!r}; expected a whole number from {MIN_INTERVALS} to {MAX_INTERVALS}"
+        )
     if path.description.n != description.n:
         raise ValueError(
             f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
@@ -124,13 +132,31 @@ def along_path(
     smooth = smoothed(Friction.chosen(friction))
     still = np.zeros(description.n)
     checker = Checker(arm, limits, constraints, parameters, smooth, avoidance, points=POINTS)
-    task = Task(description, arm, wanted, path.q([0.0, 1.0]), still, still, chosen.duration, checker, path=path)
+    task = Task(
+        description,
+        arm,
+        wanted,
+        path.q([0.0, 1.0]),
+        still,
+        still,
+        chosen.duration,
+        checker,
+        path=path,
+    )
     found = _best_timing(task, intervals, work, chosen.progress)
     report = report_of(task, found, work)
-    return replace(found.trajectory, description=description, report=report, payload=chosen.payload, friction=smooth)
+    return replace(
+        found.trajectory,
+        description=description,
+        report=report,
+        payload=chosen.payload,
+        friction=smooth,
+    )
 
 
-def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall | None) -> PlannedMotion:
+def _best_timing(
+    task: Task, intervals: int, work: Work, progress: ProgressCall | None
+) -> PlannedMotion:
     """Return the best motion; objectives other than time start from the fastest one."""
     path = cast("JointPath", task.path)
     limits = task.limits
@@ -138,7 +164,9 @@ def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall 
     states = PathStates.of(task.loaded, path, rough)
     s = knots_of(path, intervals, rough, states.even_speeds(limits))
 
-    def searched(task: Task, program: PathProgram[Profile], start: Profile | None) -> tuple[PlannedMotion, Profile]:
+    def searched(
+        task: Task, program: PathProgram[Profile], start: Profile | None
+    ) -> tuple[PlannedMotion, Profile]:
         search = MotionSearch(task, program, work, progress)
         starts = program.starts(task, None)
         if start is not None:
@@ -167,7 +195,9 @@ def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall 
             require_holdable_along(program)
             raise
 
-    def made(kind: Callable[[Task, Array], PathProgram[Profile]], task: Task) -> PathProgram[Profile]:
+    def made(
+        kind: Callable[[Task, Array], PathProgram[Profile]], task: Task
+    ) -> PathProgram[Profile]:
         building = time.perf_counter()
         program = kind(task, s)
         work.build_seconds += time.perf_counter() - building
@@ -181,4 +211,6 @@ def _require_objective(objective: Objective, duration: float | None) -> None:
     if objective.has_jerk:
         raise ValueError(f"objective is {objective}; expected time, effort or energy along a path")
     if not objective.has_time and duration is None:
-        raise ValueError(f"objective {objective} says nothing about time; expected duration=, or Time() + ...")
+        raise ValueError(
+            f"objective {objective} says nothing about time; expected duration=, or Time() + ..."
+        )

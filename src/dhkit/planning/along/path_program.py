@@ -122,7 +122,9 @@ class PathProgram(OptimizationProgram[Profile]):
         symbol = casadi.SX.sym
         size = int(self.point.path.numel())
         given = [symbol(f"p{k}", count) for k, count in enumerate(self.sizes)]
-        return IntervalSymbols(symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale"))
+        return IntervalSymbols(
+            symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale")
+        )
 
     def at_state(self, given: list[casadi.SX]) -> tuple[casadi.Function, list[Rows]]:
         """Return a state's rows and integrand as a function, and the kinds of the rows.
@@ -145,11 +147,17 @@ class PathProgram(OptimizationProgram[Profile]):
         integrand = self.task.objective.integrand(point) + casadi.sum1(u)
         inputs = [point.sdd, point.b, point.speed, point.path, u, *given]
         results = [rows, integrand]
-        kinds = [*(kind for kind, _ in limits), Rows(RowKind.POSITIVE_PART, "positive power", self.powers)]
+        kinds = [
+            *(kind for kind, _ in limits),
+            Rows(RowKind.POSITIVE_PART, "positive power", self.powers),
+        ]
         return casadi.Function("at_state", inputs, results, {"cse": True}), kinds
 
     def program(
-        self, interval: Callable[..., tuple[LocalFunction, tuple[Rows, ...]]], inner: Indices, variables: int
+        self,
+        interval: Callable[..., tuple[LocalFunction, tuple[Rows, ...]]],
+        inner: Indices,
+        variables: int,
     ) -> BlockProgram:
         """Return the program of the intervals, and of the duration as its last row.
 
@@ -168,7 +176,9 @@ class PathProgram(OptimizationProgram[Profile]):
 
         K = self.intervals
         step = np.arange(K)
-        self.positive_parts: Indices = variables + np.arange(2 * self.powers * K).reshape(2 * self.powers, K)
+        self.positive_parts: Indices = variables + np.arange(2 * self.powers * K).reshape(
+            2 * self.powers, K
+        )
         """Indices of the positive parts at the left and the right end of each interval, shape (2 powers, K)."""
         own = np.vstack([step[None], self.positive_parts])
         each = np.stack([step, step], axis=1)
@@ -189,7 +199,9 @@ class PathProgram(OptimizationProgram[Profile]):
         duration = LocalFunction(durations, casadi.SX(0, 1), casadi.sum1(durations))
         kinds = (Rows(RowKind.DURATION, "duration", 1),)
         blocks.append(Block(duration, step[:, None], np.zeros((0, 1), dtype=int), kinds))
-        return BlockProgram(variables + self.positive_parts.size, self.parameter_count, tuple(blocks))
+        return BlockProgram(
+            variables + self.positive_parts.size, self.parameter_count, tuple(blocks)
+        )
 
     def positive_powers(self, sd: Array, left: Array, right: Array) -> Array:
         """Return positive parts of powers at both ends of each interval, shape (2 powers, K).
@@ -262,7 +274,9 @@ class PathProgram(OptimizationProgram[Profile]):
 
     def tightened(self, margins: Margins, more: dict[int, Array]) -> tuple[Self, Margins]:
         """Return the program with intervals halved where limits are exceeded most, and margins raised elsewhere."""
-        is_refined = np.any([(share > self.small_step).any(axis=1) for share in more.values()], axis=0)
+        is_refined = np.any(
+            [(share > self.small_step).any(axis=1) for share in more.values()], axis=0
+        )
         if not is_refined.any() or self.intervals + is_refined.sum() > 2 * MAX_INTERVALS:
             return self, margins.raised(more)
 
@@ -270,4 +284,6 @@ class PathProgram(OptimizationProgram[Profile]):
         factor = np.where(is_refined, 1 / REFINED, 1.0)[:, None]
         margins = margins.raised({limit: factor * share for limit, share in more.items()})
         middles = ((self.s[1:] + self.s[:-1]) / 2)[is_refined]
-        return type(self)(self.task, np.sort(np.append(self.s, middles))), margins.divided(1 + is_refined)
+        return type(self)(self.task, np.sort(np.append(self.s, middles))), margins.divided(
+            1 + is_refined
+        )

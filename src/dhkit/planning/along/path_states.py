@@ -176,14 +176,19 @@ class PathStates:
         # A constant b has sdd = b' / 2 = 0, so that the largest factor of b = 1 is the largest b = sd^2.
         fastest = self.fastest(limits)
         ones = np.ones(len(fastest))
-        most = np.minimum(np.minimum(fastest[:-1], fastest[1:]), self._factors(limits, ones).min(axis=0))
+        most = np.minimum(
+            np.minimum(fastest[:-1], fastest[1:]), self._factors(limits, ones).min(axis=0)
+        )
         speeds: Array = np.sqrt(most)
         return speeds
 
     def largest(self, limits: Limits, shape: Array) -> float:
         """Return the largest factor of sd^2 = shape (K+1,), 1/s^2, with which all limits that rest keeps are kept."""
         with np.errstate(divide="ignore"):
-            return min(float(np.min(self.fastest(limits) / shape)), float(self._factors(limits, shape).min()))
+            return min(
+                float(np.min(self.fastest(limits) / shape)),
+                float(self._factors(limits, shape).min()),
+            )
 
     def _factors(self, limits: Limits, shape: Array) -> Array:
         """Return the largest factors of b = sd^2 = shape (K+1,) by limits of torque and acceleration, shape (2, K).
@@ -264,7 +269,9 @@ class PathPoint(Point):
         if self.friction is None:
             return casadi.SX(self.n, 1)
         parameters = friction_parameters(self.description.numbers, self.friction.width)
-        return friction_torque(self.qd, casadi.SX(casadi.DM(parameters)), smooth=self.friction.width > 0)
+        return friction_torque(
+            self.qd, casadi.SX(casadi.DM(parameters)), smooth=self.friction.width > 0
+        )
 
     @cached_property
     def tool_velocity(self) -> casadi.SX:

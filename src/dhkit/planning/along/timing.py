@@ -105,7 +105,9 @@ class TimingProgram(PathProgram[Profile]):
         tolerance = TIME_TOLERANCE if task.objective.has_time else SMOOTH_TOLERANCE
         self.solver = Solver(self.blocks, K, tolerance=tolerance)
 
-    def _interval(self, *, first: bool = False, last: bool = False) -> tuple[LocalFunction, tuple[Rows, ...]]:
+    def _interval(
+        self, *, first: bool = False, last: bool = False
+    ) -> tuple[LocalFunction, tuple[Rows, ...]]:
         """Return the rows and the cost of an interval; the first begins at rest, the last ends there."""
         import casadi
 
@@ -137,13 +139,19 @@ class TimingProgram(PathProgram[Profile]):
         # The limits at both ends, and the integral of the rates by the trapezoidal rule.
         at_state, limits = self.at_state(symbols.given)
         rates = []
-        for x, v, coefficients, part in zip(b, speed, (symbols.left, symbols.right), parts, strict=True):
+        for x, v, coefficients, part in zip(
+            b, speed, (symbols.left, symbols.right), parts, strict=True
+        ):
             row, rate = at_state(sdd, x, v, coefficients, part, *symbols.given)
             rows.append(row)
             rates.append(rate)
             kinds += limits
         rate_begin, rate_end = rates
-        cost = symbols.scale * duration * (self.task.objective.time_weight + (rate_begin + rate_end) / 2)
+        cost = (
+            symbols.scale
+            * duration
+            * (self.task.objective.time_weight + (rate_begin + rate_end) / 2)
+        )
 
         z = casadi.vertcat(duration, *parts, inner)
         return LocalFunction(z, symbols.vector, casadi.vertcat(*rows), cost), tuple(kinds)
@@ -161,7 +169,9 @@ class TimingProgram(PathProgram[Profile]):
     def usual_profile(self) -> Profile:
         """Return a guess: b = 4 beta s (1 - s), s = sin(sqrt(beta) t)^2, which takes pi / (2 sqrt beta)."""
         shape = 4 * self.s * (1 - self.s)
-        return Profile(self.s, GUESS_SPEED_SHARE * self.states.largest(self.task.limits, shape) * shape)
+        return Profile(
+            self.s, GUESS_SPEED_SHARE * self.states.largest(self.task.limits, shape) * shape
+        )
 
     def next_guess(self, guess: Profile, found: Profile) -> Profile:
         """Return the last solution on the grid, which may have become finer."""
@@ -277,7 +287,9 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         self.blocks = self.program(self._interval, np.stack([self._sd, self._sdd]), 3 * K - 2)
         self.solver = Solver(self.blocks, K, tolerance=JERK_LIMITED_TOLERANCE)
 
-    def _interval(self, *, first: bool = False, last: bool = False) -> tuple[LocalFunction, tuple[Rows, ...]]:
+    def _interval(
+        self, *, first: bool = False, last: bool = False
+    ) -> tuple[LocalFunction, tuple[Rows, ...]]:
         """Return the rows and the cost of an interval; the first begins at rest, the last ends there."""
         import casadi
 
@@ -309,7 +321,9 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         reciprocals = symbols.given[Limit.JERK]
         at_state, limits = self.at_state(symbols.given)
         rates = []
-        for state, path, part in zip((begin, end), (symbols.left, symbols.right), parts, strict=True):
+        for state, path, part in zip(
+            (begin, end), (symbols.left, symbols.right), parts, strict=True
+        ):
             v, a = casadi.vertsplit(state)
             row, rate = at_state(a, v * v, v, path, part, *symbols.given)
             qs = path[n : 2 * n]

@@ -36,7 +36,11 @@ MAX_TURN = 0.5
 
 
 def smallest_between(
-    states: States, found: Array, gaps: Callable[[Array], Array], least: Array, beside_axes: float = 0.0
+    states: States,
+    found: Array,
+    gaps: Callable[[Array], Array],
+    least: Array,
+    beside_axes: float = 0.0,
 ) -> Array:
     """Return the smallest distances that are found after each state, before the next, shape (N, G), m.
 
@@ -66,7 +70,13 @@ def smallest_between(
     radii = [capsule.radius for capsule in link_capsules(states.description) if capsule.radius > 0]
     smallest_travel = min([SMALLEST_TRAVEL, *(SMALLEST_SHARE * radius for radius in radii)])
 
-    parts = Parts(np.arange(len(steps)), np.zeros(len(steps)), np.ones(len(steps)), found[steps], found[steps + 1])
+    parts = Parts(
+        np.arange(len(steps)),
+        np.zeros(len(steps)),
+        np.ones(len(steps)),
+        found[steps],
+        found[steps + 1],
+    )
     while parts.count:
         travel = L[parts.step] * (parts.end - parts.begin)
         needed = least[parts.step]
@@ -120,7 +130,11 @@ class Parts:
         )
 
     def divided(
-        self, counts: NDArray[np.int_], states: States, steps: NDArray[np.int_], gaps: Callable[[Array], Array]
+        self,
+        counts: NDArray[np.int_],
+        states: States,
+        steps: NDArray[np.int_],
+        gaps: Callable[[Array], Array],
     ) -> Parts:
         """Return each part divided into ``counts`` (M,) equal ones, and measure the distances where they meet.
 

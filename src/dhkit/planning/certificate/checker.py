@@ -11,7 +11,11 @@ import numpy as np
 from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.description.robot import require_bodies
 from dhkit.display import html_block, html_table, repr_line, value_line
-from dhkit.planning.certificate.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance, motion_constraints
+from dhkit.planning.certificate.collision_avoidance import (
+    NO_AVOIDANCE,
+    CollisionAvoidance,
+    motion_constraints,
+)
 from dhkit.planning.criteria import Constraint, Limit, LoadedArm, PositionLimit, States, loaded
 from dhkit.planning.obstacles import Scene, not_checked
 from dhkit.planning.second_check import Recheck, recheck
@@ -98,7 +102,9 @@ class Certificate:
     @property
     def ok(self) -> bool:
         """Whether all limits are kept, up to 5e-7 of each, and the second check, if there was one, found nothing."""
-        return self.violation <= ACCEPTED_EXCESS and (self.independent is None or self.independent.ok)
+        return self.violation <= ACCEPTED_EXCESS and (
+            self.independent is None or self.independent.ok
+        )
 
     def excess_of(self, limit: int) -> float:
         """Return the largest excess of a constraint, by its place, as a share of the limit; -inf without it."""
@@ -201,19 +207,29 @@ def certify(
         raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {description.n}")
     carried = motion.payload if payload is None else payload
     chosen = motion.friction if friction is None else Friction.chosen(friction)
-    points = max(POINTS, POINTS_PER_COEFFICIENT * motion.coefficients.shape[1], _points_of_turns(description, motion))
+    points = max(
+        POINTS,
+        POINTS_PER_COEFFICIENT * motion.coefficients.shape[1],
+        _points_of_turns(description, motion),
+    )
     avoidance = CollisionAvoidance.of(obstacles, clearance, self_collision)
     if avoidance:
         avoidance = avoidance.between(description, motion.q(0.0), motion.q(motion.duration))
-    checker = Checker(loaded(description, carried), limits, friction=chosen, avoidance=avoidance, points=points)
+    checker = Checker(
+        loaded(description, carried), limits, friction=chosen, avoidance=avoidance, points=points
+    )
     certificate = checker.check(motion)
     if not independent:
         return certificate
     claims = avoidance.claims(description) if avoidance else ()
-    return replace(certificate, independent=recheck(description, motion, limits, carried, chosen, claims))
+    return replace(
+        certificate, independent=recheck(description, motion, limits, carried, chosen, claims)
+    )
 
 
-def _not_checked(description: Description, limits: Limits, avoidance: CollisionAvoidance) -> tuple[str, ...]:
+def _not_checked(
+    description: Description, limits: Limits, avoidance: CollisionAvoidance
+) -> tuple[str, ...]:
     """Return the robot's limits, and the distances from the motion's obstacles, that a certificate leaves out."""
     bare = [joint.name for joint in description.joints if not joint.bodies]
     has_efforts = bool(np.isfinite(description.numbers.effort).any())
@@ -222,7 +238,9 @@ def _not_checked(description: Description, limits: Limits, avoidance: CollisionA
     if bare and has_efforts and not has_torque_limits:
         found.append(f"torques, as the links of {', '.join(bare)} have no body")
     if avoidance:
-        found += not_checked(description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance)
+        found += not_checked(
+            description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance
+        )
         found += avoidance.kept_in_part
     return tuple(found)
 
@@ -248,7 +266,9 @@ class Checker:
         # A break belongs to both its intervals: the last state of each comes from the left.
         inside = States.of(self.description, trajectory, t[:, :-1], self.friction, "right")
         last = States.of(self.description, trajectory, t[:, -1:], self.friction, "left")
-        return replace(inside.beside(last, self.points), motion=trajectory.pieces, points=self.points)
+        return replace(
+            inside.beside(last, self.points), motion=trajectory.pieces, points=self.points
+        )
 
     @cached_property
     def every(self) -> tuple[tuple[Constraint, Array], ...]:
@@ -264,14 +284,18 @@ class Checker:
 
     def measured(self, states: States) -> dict[int, Array]:
         """Return the use of each limit, shape (N, k), which is 1 at the limit."""
-        return {k: constraint.use(states, given) for k, (constraint, given) in self.limiting.items()}
+        return {
+            k: constraint.use(states, given) for k, (constraint, given) in self.limiting.items()
+        }
 
     def peaks(self, states: States) -> dict[int, Array]:
         """Return the use of each limit at the grid's states, shape (N, k), raised to its peak between states.
 
         The peak is that of the cubic through four neighbouring states of an interval.
         """
-        return {k: _with_peaks_between(use, self.points) for k, use in self.measured(states).items()}
+        return {
+            k: _with_peaks_between(use, self.points) for k, use in self.measured(states).items()
+        }
 
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
         """Return the certificate of a motion; ``states`` are its states on the grid, if they are known."""
@@ -352,7 +376,10 @@ class Checker:
         def excess(c: float) -> float:
             slower = states.slowed(c)
             uses = (constraint.use(slower, given) for constraint, given in moving)
-            return max((float(np.max(_with_peaks_between(use, self.points))) - 1 for use in uses), default=-1.0)
+            return max(
+                (float(np.max(_with_peaks_between(use, self.points))) - 1 for use in uses),
+                default=-1.0,
+            )
 
         low = 1.0
         e_low = excess(low)
@@ -406,9 +433,13 @@ def _with_peaks_between(use: Array, points: int) -> Array:
 
 def _check(constraint: Constraint, limit: int, excess: Array, times: Array) -> Check:
     """Return the check of a constraint with excesses (N, k) at times (N,), s: the largest one."""
-    excess = np.where(np.isnan(excess), np.inf, excess)  # a limit whose use is not a number is not kept
+    excess = np.where(
+        np.isnan(excess), np.inf, excess
+    )  # a limit whose use is not a number is not kept
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-    return Check(constraint.what, float(excess[k, i]), int(i), float(times[k]), constraint.of_joints, limit)
+    return Check(
+        constraint.what, float(excess[k, i]), int(i), float(times[k]), constraint.of_joints, limit
+    )
 
 
 def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:

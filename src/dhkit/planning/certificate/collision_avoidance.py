@@ -138,7 +138,9 @@ class CollisionAvoidance:
         if self.self_collision:
             names.append("itself")
         counted = Counter(names)
-        return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
+        return ", ".join(
+            name if count == 1 else f"{count} x {name}" for name, count in counted.items()
+        )
 
     def report(self, arm: Description, excess: float) -> dict[str, Any]:
         """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, m."""
@@ -171,7 +173,10 @@ class CollisionAvoidance:
         near_ends = [pair for pair in self.reduced if min(pair.start, pair.goal) > 0]
         return (
             *(f"all of the clearance {where}: {pair}" for pair in near_ends),
-            *(f"all of the clearance during the whole motion: {pair}" for pair in self._reduced_by_shapes),
+            *(
+                f"all of the clearance during the whole motion: {pair}"
+                for pair in self._reduced_by_shapes
+            ),
         )
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
@@ -184,7 +189,9 @@ class CollisionAvoidance:
         """
         size = checked_pairs(description).size
         if self.clearance > size:
-            raise PlanningError(f"clearance is {self.clearance:.4g} m; the arm itself reaches over {size:.4g} m")
+            raise PlanningError(
+                f"clearance is {self.clearance:.4g} m; the arm itself reaches over {size:.4g} m"
+            )
         at_ends = np.stack([start, goal])
 
         separation = Separation(description, self.obstacles, self.self_collision)
@@ -212,7 +219,10 @@ class CollisionAvoidance:
 
         A clearance that is reduced at an end counts as reduced during the whole motion.
         """
-        return (*self._claims_beside_obstacles(description), *self._claims_between_links(description))
+        return (
+            *self._claims_beside_obstacles(description),
+            *self._claims_between_links(description),
+        )
 
     def _claims_beside_obstacles(self, description: Description) -> list[Claim]:
         """Return the claimed distances of links from obstacles."""
@@ -228,9 +238,13 @@ class CollisionAvoidance:
 
         claims = []
         for k, obstacle in enumerate(self.obstacles):
-            unchecked = {link for link, gap in standing(description, obstacle) if gap < self.clearance}
+            unchecked = {
+                link for link, gap in standing(description, obstacle) if gap < self.clearance
+            }
             links = [link for link in range(1, description.n + 1) if link not in unchecked]
-            claims += [Claim(link, obstacle, least.get((link, k), self.clearance)) for link in links]
+            claims += [
+                Claim(link, obstacle, least.get((link, k), self.clearance)) for link in links
+            ]
         return claims
 
     def _claims_between_links(self, description: Description) -> list[Claim]:
@@ -285,7 +299,9 @@ class CollisionAvoidance:
             capsules = [capsule for capsule in (pair.capsule, pair.other) if capsule is not None]
             for end in np.flatnonzero(kept < self.clearance):
                 # Distance of the capsules' axes from their places at that end of the motion.
-                travel = np.linalg.norm(axes[:, capsules] - axes_at_ends[end, capsules], axis=-1).max(axis=(1, 2))
+                travel = np.linalg.norm(
+                    axes[:, capsules] - axes_at_ends[end, capsules], axis=-1
+                ).max(axis=(1, 2))
                 near = (travel < LEAVING * self.clearance) | self.is_reduced_throughout
                 need[near, p] = np.minimum(need[near, p], kept[end])
         return need
@@ -299,7 +315,9 @@ class CollisionAvoidance:
         description = states.description
 
         def gaps(q: Array) -> Array:
-            return np.column_stack([self._distances(description, q), self._reduced_distances(description, q)])
+            return np.column_stack(
+                [self._distances(description, q), self._reduced_distances(description, q)]
+            )
 
         found = gaps(states.q)
         required = np.full(found.shape, self.clearance)
@@ -310,7 +328,8 @@ class CollisionAvoidance:
         least = _without_slack(required_between)
         between = smallest_between(states, found, gaps, least)
         result: Array = np.maximum(
-            _largest_shortfall(required, found, required_between, between, least), self._shortfalls_of_shapes(states)
+            _largest_shortfall(required, found, required_between, between, least),
+            self._shortfalls_of_shapes(states),
         )
         return result
 
@@ -335,7 +354,10 @@ class CollisionAvoidance:
 
         They are lower bounds where they exceed the required distances by ``more``, m.
         """
-        gaps = [shape_distances(description, q, pair.bodies, pair.kept + more) for pair in self.by_shapes]
+        gaps = [
+            shape_distances(description, q, pair.bodies, pair.kept + more)
+            for pair in self.by_shapes
+        ]
         return np.stack(gaps, axis=1) if gaps else np.zeros((len(q), 0))
 
     def keeps_shapes_apart(self, description: Description, q: Array) -> NDArray[np.bool_]:
@@ -351,7 +373,9 @@ class CollisionAvoidance:
 
     def _reduced_distances(self, description: Description, q: Array) -> Array:
         """Return the distances of the pairs whose clearance is reduced, shape (N, P), m."""
-        each = [pair_distances(description, q, self.obstacles, reduced.pair) for reduced in self.reduced]
+        each = [
+            pair_distances(description, q, self.obstacles, reduced.pair) for reduced in self.reduced
+        ]
         return np.stack(each, axis=1) if each else np.zeros((len(q), 0))
 
     def require_gap(self, description: Description, q: Array, where: str, least: float) -> None:
@@ -368,10 +392,14 @@ class CollisionAvoidance:
             return
         link, obstacle = found.pair or ("the arm", "an obstacle")
         state = f"{1000 * gap:.3g} mm from" if gap > 0 else f"{-1000 * gap:.3g} mm inside"
-        raise PlanningError(f"{where}: {link} is {state} {obstacle}, {1000 * self.clearance:.3g} mm are asked for")
+        raise PlanningError(
+            f"{where}: {link} is {state} {obstacle}, {1000 * self.clearance:.3g} mm are asked for"
+        )
 
 
-def _largest_shortfall(required: Array, found: Array, required_between: Array, between: Array, least: Array) -> Array:
+def _largest_shortfall(
+    required: Array, found: Array, required_between: Array, between: Array, least: Array
+) -> Array:
     """Return the largest shortfall of distances at states and between them, shape (N,), m.
 
     Parameters

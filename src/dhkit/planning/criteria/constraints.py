@@ -65,7 +65,9 @@ class Constraint:
     @property
     def what(self) -> str:
         """Name of the limited quantity."""
-        raise NotImplementedError(f"{type(self).__name__} has no property what, the name of the limited quantity")
+        raise NotImplementedError(
+            f"{type(self).__name__} has no property what, the name of the limited quantity"
+        )
 
     @property
     def is_limiting(self) -> bool:
@@ -78,11 +80,15 @@ class Constraint:
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
         """Return the limited expressions, k x 1, without unit, 1 at the limit."""
-        raise NotImplementedError(f"{type(self).__name__} has no method rows, the expressions for the optimizer")
+        raise NotImplementedError(
+            f"{type(self).__name__} has no method rows, the expressions for the optimizer"
+        )
 
     def measured(self, states: States, parameters: Array) -> Array:
         """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
-        raise NotImplementedError(f"{type(self).__name__} has no method measured, the numbers for the certificate")
+        raise NotImplementedError(
+            f"{type(self).__name__} has no method measured, the numbers for the certificate"
+        )
 
     def checked_rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
         """Return ``rows``, checked.
@@ -97,7 +103,9 @@ class Constraint:
         rows: object = self.rows(point, parameters)
         if not isinstance(rows, casadi.SX) or rows.shape[1] != 1:
             kind = getattr(rows, "shape", type(rows).__name__)
-            raise TypeError(f"{type(self).__name__}.rows returned {kind}; expected casadi.SX of shape (k, 1)")
+            raise TypeError(
+                f"{type(self).__name__}.rows returned {kind}; expected casadi.SX of shape (k, 1)"
+            )
         return rows
 
     def use(self, states: States, parameters: Array) -> Array:
@@ -116,7 +124,9 @@ class Constraint:
             raise ValueError(f"{name} has shape {values.shape}; expected ({len(states.times)}, k)")
         if np.isnan(values).any():
             t = states.times[int(np.isnan(values).any(axis=1).argmax())]
-            raise PlanningError(f"{self.what} is not a number at {t:.3g} s, so that no motion can be certified")
+            raise PlanningError(
+                f"{self.what} is not a number at {t:.3g} s, so that no motion can be certified"
+            )
         return np.abs(values) if self.two_sided else values
 
     def bounds(self, parameters: Array, shares: Array) -> tuple[Array, Array]:
@@ -195,7 +205,9 @@ class TorqueSpeedLine(Constraint):
     def measured(self, states: States, parameters: Array) -> Array:
         """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
         n = states.n
-        measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(self.no_load_speed, n)
+        measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(
+            self.no_load_speed, n
+        )
         return measured
 
     __repr__ = value_line
@@ -232,7 +244,12 @@ class Limit(IntEnum):
         return self.name.lower()
 
 
-QUANTITIES = {Limit.VELOCITY: "qd", Limit.ACCELERATION: "qdd", Limit.JERK: "jerk", Limit.TORQUE: "tau"}
+QUANTITIES = {
+    Limit.VELOCITY: "qd",
+    Limit.ACCELERATION: "qdd",
+    Limit.JERK: "jerk",
+    Limit.TORQUE: "tau",
+}
 """Attributes of points and states that are limited."""
 
 
@@ -312,7 +329,10 @@ class PositionLimit(Constraint):
 def joint_limits(limits: Limits) -> tuple[Constraint, ...]:
     """Return the constraints of the joint limits, in the order of :class:`Limit`."""
     of_magnitude = (Limit.VELOCITY, Limit.ACCELERATION, Limit.JERK, Limit.TORQUE)
-    return (PositionLimit(limits), *(JointLimit(kind, getattr(limits, kind.what)) for kind in of_magnitude))
+    return (
+        PositionLimit(limits),
+        *(JointLimit(kind, getattr(limits, kind.what)) for kind in of_magnitude),
+    )
 
 
 @dataclass(frozen=True)
@@ -466,7 +486,9 @@ class ToolOrientation(Constraint):
 
     def measured(self, states: States, parameters: Array) -> Array:
         """Return the limited quantity at samples, shape (N, k)."""
-        trace = np.einsum("kij,ij->k", states.T_world_tool[:, :3, :3], parameters.reshape(3, 3, order="F"))
+        trace = np.einsum(
+            "kij,ij->k", states.T_world_tool[:, :3, :3], parameters.reshape(3, 3, order="F")
+        )
         return np.asarray(_share_of_angle((trace - 1) / 2, self.tolerance))[:, None]
 
 

@@ -48,7 +48,9 @@ class Term:
 
     def __post_init__(self) -> None:
         if not isinstance(self.weight, Real) or not math.isfinite(self.weight) or self.weight <= 0:
-            raise ValueError(f"{type(self).__name__}: weight is {self.weight!r}; expected a positive number")
+            raise ValueError(
+                f"{type(self).__name__}: weight is {self.weight!r}; expected a positive number"
+            )
 
     @property
     def is_smooth(self) -> bool:
@@ -57,7 +59,9 @@ class Term:
 
     def integrand(self, point: Point) -> casadi.SX:
         """Return the integrand over time, 1 x 1, unit of the term over s, of terms that have one."""
-        raise NotImplementedError(f"{type(self).__name__} is not an integral of a function of the state")
+        raise NotImplementedError(
+            f"{type(self).__name__} is not an integral of a function of the state"
+        )
 
     def positive_parts(self, point: Point) -> casadi.SX:
         """Return quantities whose positive parts are added to the integrand, k x 1, unit of the term over s.
@@ -109,7 +113,9 @@ class Effort(Term):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "joint_weights", _numbers("Effort", "joint weights", self.joint_weights))
+        object.__setattr__(
+            self, "joint_weights", _numbers("Effort", "joint weights", self.joint_weights)
+        )
 
     def _weights(self, n: int) -> Array:
         return _each("Effort", "joint weights", self.joint_weights or 1.0, n)
@@ -161,7 +167,9 @@ class Energy(Term):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "motor_constants", _numbers("Energy", "motor constants", self.motor_constants))
+        object.__setattr__(
+            self, "motor_constants", _numbers("Energy", "motor constants", self.motor_constants)
+        )
 
     @property
     def is_smooth(self) -> bool:
@@ -202,7 +210,9 @@ class Energy(Term):
             total = (D - P) / 2
         if constants:
             # A winding loses (tau_m / k)^2 with the motor's torque tau_m = tau / gear.
-            total += casadi.sumsqr(point.tau / (_each("Energy", "motor constants", constants, n) * point.gear))
+            total += casadi.sumsqr(
+                point.tau / (_each("Energy", "motor constants", constants, n) * point.gear)
+            )
         return total
 
     def positive_parts(self, point: Point) -> casadi.SX:
@@ -218,7 +228,10 @@ class Energy(Term):
         if not self.regenerates:
             power = np.maximum(power, 0.0)
         if self.constants:
-            power = power + (states.tau / (np.array(self.constants) * gear_ratios(states.description))) ** 2
+            power = (
+                power
+                + (states.tau / (np.array(self.constants) * gear_ratios(states.description))) ** 2
+            )
         total: Array = np.sum(power, axis=1)
         return total
 
@@ -276,7 +289,9 @@ class Objective:
                     f"objective is {objective!r}; expected one of {', '.join(OBJECTIVES)}, or Time() and the like"
                 )
             return cls((OBJECTIVES[objective],))
-        raise TypeError(f"objective is {objective!r}; expected one of {', '.join(OBJECTIVES)}, or Time() and the like")
+        raise TypeError(
+            f"objective is {objective!r}; expected one of {', '.join(OBJECTIVES)}, or Time() and the like"
+        )
 
     @property
     def has_time(self) -> bool:
@@ -338,7 +353,9 @@ class Objective:
         """Return all terms' quantities whose positive parts are added to the integrand, k x 1."""
         import casadi
 
-        each = [term.weight * term.positive_parts(point) for term in self.terms if term.has_integrand]
+        each = [
+            term.weight * term.positive_parts(point) for term in self.terms if term.has_integrand
+        ]
         return casadi.vertcat(casadi.SX(0, 1), *each)
 
     def __add__(self, other: Term | Objective) -> Objective:
@@ -355,23 +372,34 @@ class Objective:
         names = [type(term).__name__.lower() for term in self.terms]
         if all(term.weight == 1 for term in self.terms):
             return " + ".join(names)
-        return " + ".join(f"{term.weight:g} {name}" for term, name in zip(self.terms, names, strict=True))
+        return " + ".join(
+            f"{term.weight:g} {name}" for term, name in zip(self.terms, names, strict=True)
+        )
 
     __repr__ = value_line
 
 
 ObjectiveLike: TypeAlias = "str | Term | Objective"
 
-OBJECTIVES: dict[str, Term] = {"time": Time(), "effort": Effort(), "energy": Energy(), "jerk": Jerk()}
+OBJECTIVES: dict[str, Term] = {
+    "time": Time(),
+    "effort": Effort(),
+    "energy": Energy(),
+    "jerk": Jerk(),
+}
 
 
-def cost_of(objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None = None) -> float:
+def cost_of(
+    objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None = None
+) -> float:
     """Return an objective's value for a motion, in the units of its terms."""
     rates, weights = _rates(objective, trajectory, arm, friction)
     return float(weights @ sum(rates))
 
 
-def size_of(objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None = None) -> float:
+def size_of(
+    objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None = None
+) -> float:
     """Return the magnitude of an objective along a motion: the integral of its terms' absolute values."""
     rates, weights = _rates(objective, trajectory, arm, friction)
     return float(weights @ sum(np.abs(rate) for rate in rates))

@@ -39,7 +39,9 @@ def loaded(description: Description, payload: Payload | None = None) -> LoadedAr
 class Point:
     """q, qd and qdd of an arm as SX symbols, and quantities derived from them on first use."""
 
-    def __init__(self, description: Description, limits: Limits, friction: Friction | None, payload: bool) -> None:
+    def __init__(
+        self, description: Description, limits: Limits, friction: Friction | None, payload: bool
+    ) -> None:
         self.description = description
         self.limits = limits
         self.n = description.n
@@ -173,7 +175,9 @@ class States:
         import pinocchio as pin
 
         data = model.createData()
-        return self._gathered([pin.computeGeneralizedGravity(model, data, q).copy() for q in self.q])
+        return self._gathered(
+            [pin.computeGeneralizedGravity(model, data, q).copy() for q in self.q]
+        )
 
     @cached_property
     def T_world_tool(self) -> Array:
@@ -203,8 +207,12 @@ class States:
         so that without friction tau = g + (tau(c = 1) - g) / c^2 (Hollerbach 1984, Dynamic scaling of manipulator
         trajectories).
         """
-        slower = replace(self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3)
-        slower = replace(slower, motion=None)  # their joint values are the same, and so is the clearance
+        slower = replace(
+            self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3
+        )
+        slower = replace(
+            slower, motion=None
+        )  # their joint values are the same, and so is the clearance
         known: dict[str, Any] = slower.__dict__
         if "_rigid" in self.__dict__:
             known["_rigid"] = self.gravity_torque + (self._rigid - self.gravity_torque) / c**2
@@ -230,7 +238,11 @@ class States:
         return tau + self.qdd @ self.description.numbers.coupling
 
     def _friction_torque(self, qd: Array) -> Array | float:
-        return 0.0 if self.friction is None else dynamics.friction_torque(self.description, qd, self.friction)
+        return (
+            0.0
+            if self.friction is None
+            else dynamics.friction_torque(self.description, qd, self.friction)
+        )
 
     @cached_property
     def _tool(self) -> tuple[Array, Array, Array]:

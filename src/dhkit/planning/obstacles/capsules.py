@@ -77,7 +77,9 @@ def refine(balls: Balls) -> Enclosure:
     """
     from scipy.optimize import minimize
 
-    ranked = sorted(_candidates(balls), key=lambda R: _about(balls, R[:, 2], _middle(balls, R)).volume)
+    ranked = sorted(
+        _candidates(balls), key=lambda R: _about(balls, R[:, 2], _middle(balls, R)).volume
+    )
     R = ranked[0]
     middle = _middle(balls, R)
     best = _about(balls, R[:, 2], middle)
@@ -85,7 +87,9 @@ def refine(balls: Balls) -> Enclosure:
 
     def tilted(x: Array) -> Enclosure:
         direction = R @ np.array([x[0], x[1], 1.0])
-        return _about(balls, direction / np.linalg.norm(direction), middle + scale * (R[:, :2] @ x[2:]))
+        return _about(
+            balls, direction / np.linalg.norm(direction), middle + scale * (R[:, :2] @ x[2:])
+        )
 
     steps = np.concatenate([np.zeros((1, 4)), 0.1 * np.eye(4)])
     found = minimize(
@@ -233,7 +237,9 @@ def world_axes(description: Description, q: ArrayLike) -> Array:
     ends = np.array([(capsule.start, capsule.end) for capsule in capsules])
 
     # R x + p of each end x, as rows x^T R^T + p^T.
-    axes: Array = np.matmul(ends, np.swapaxes(frames[..., :3, :3], -1, -2)) + frames[..., None, :3, 3]
+    axes: Array = (
+        np.matmul(ends, np.swapaxes(frames[..., :3, :3], -1, -2)) + frames[..., None, :3, 3]
+    )
     return axes
 
 
@@ -272,7 +278,9 @@ def _merge_groups(groups: list[Balls]) -> list[Balls]:
     sets = [frozenset([i]) for i in range(len(groups))]
     while len(sets) > 1:
         first, second = min(combinations(sets, 2), key=additional)
-        if len(sets) <= MAX_CAPSULES and volume(first | second) > MERGE_RATIO * (volume(first) + volume(second)):
+        if len(sets) <= MAX_CAPSULES and volume(first | second) > MERGE_RATIO * (
+            volume(first) + volume(second)
+        ):
             break
         sets = [members for members in sets if members not in (first, second)] + [first | second]
     return [_merge(groups, members) for members in sets]
@@ -317,7 +325,9 @@ def _rims(radius: float, length: float) -> Array:
     """
     angles = 2 * np.pi * np.arange(RIM_CORNERS) / RIM_CORNERS
     x, y = np.array([np.cos(angles), np.sin(angles)]) * radius / np.cos(np.pi / RIM_CORNERS)
-    return np.concatenate([np.stack([x, y, np.full(RIM_CORNERS, z)], axis=1) for z in (-length / 2, length / 2)])
+    return np.concatenate(
+        [np.stack([x, y, np.full(RIM_CORNERS, z)], axis=1) for z in (-length / 2, length / 2)]
+    )
 
 
 def _thickened(vertices: Array) -> Array:

@@ -12,7 +12,14 @@ from dhkit.description import Array, Box, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.model.shapes import links_without_shapes, missing_shapes
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
-from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs, pair_text, standing
+from dhkit.planning.obstacles.pairs import (
+    Pair,
+    capsules_beside,
+    ends_above,
+    link_pairs,
+    pair_text,
+    standing,
+)
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, Solids, check_obstacles
 from dhkit.planning.obstacles.solids import (
     Bounds,
@@ -57,7 +64,9 @@ class Distances:
 
 
 @takes_robot
-def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
+def distance(
+    description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False
+) -> Distances:
     """Return exact distances of an arm's capsules from obstacles, and from each other.
 
     Distances that no motion changes are left out, see :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: those of
@@ -116,7 +125,9 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
             found.append((gaps, np.zeros(len(gaps), dtype=int)))
             names.append([(a.name, b.name)])
         itself = np.min([gaps for gaps, _ in found[len(obstacles) :]], axis=0)
-    every = np.stack([gaps for gaps, _ in found], axis=-1) if found else np.full((len(axes), 1), np.inf)
+    every = (
+        np.stack([gaps for gaps, _ in found], axis=-1) if found else np.full((len(axes), 1), np.inf)
+    )
 
     def whole(values: Array) -> Array:
         result = np.full((len(rows), *values.shape[1:]), np.nan)
@@ -128,12 +139,17 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
         pair=_worst(every, found, names),
         per_obstacle=whole(every[:, : len(obstacles)] if found else every[:, :0]),
         itself=whole(itself),
-        not_checked=_not_checked_beside(description, obstacles, self_collision, every) if found else (),
+        not_checked=_not_checked_beside(description, obstacles, self_collision, every)
+        if found
+        else (),
     )
 
 
 def _not_checked_beside(
-    description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool, found: Array
+    description: Description,
+    obstacles: Sequence[Obstacle | Floor],
+    self_collision: bool,
+    found: Array,
 ) -> tuple[str, ...]:
     """Return the parts of an arm left out of distances (N, m), if they may be nearer than the smallest of these."""
     finite = found[np.isfinite(found)]
@@ -141,7 +157,10 @@ def _not_checked_beside(
 
 
 def not_checked(
-    description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool, nearer_than: float
+    description: Description,
+    obstacles: Sequence[Obstacle | Floor],
+    self_collision: bool,
+    nearer_than: float,
 ) -> tuple[str, ...]:
     """Return the parts of an arm that are left out of its distances, in words.
 
@@ -158,11 +177,19 @@ def not_checked(
     for obstacle in obstacles:
         for link, gap in standing(description, obstacle):
             if gap < nearer_than:
-                state = f"{1000 * gap:.3g} mm apart in all" if gap > 0 else "which overlap in all sampled"
-                words.append(f"part of {link_name(link)} and {obstacle.name}, {state} configurations")
+                state = (
+                    f"{1000 * gap:.3g} mm apart in all"
+                    if gap > 0
+                    else "which overlap in all sampled"
+                )
+                words.append(
+                    f"part of {link_name(link)} and {obstacle.name}, {state} configurations"
+                )
     for a, b, gap in link_pairs(description).steady if self_collision else ():
         if gap < nearer_than:
-            words.append(f"parts of {pair_text(a, b)}, {1000 * gap:.3g} mm apart in all configurations")
+            words.append(
+                f"parts of {pair_text(a, b)}, {1000 * gap:.3g} mm apart in all configurations"
+            )
     overlapping = link_pairs(description).unchecked_text if self_collision else ""
     if overlapping:
         words.append(f"{overlapping}, which overlap in all sampled configurations")
@@ -186,10 +213,14 @@ def smallest_distances(
     least = np.full(len(axes), np.inf)
     for k, item in enumerate(obstacles):
         if isinstance(item, Floor):
-            heights = _heights(description, capsules, axes, item, {i for i, j, _ in left_out if j == k})
+            heights = _heights(
+                description, capsules, axes, item, {i for i, j, _ in left_out if j == k}
+            )
             least = np.minimum(least, heights.min(axis=1, initial=np.inf))
     if self_collision:
-        pairs = tuple((i, j) for i, j in link_pairs(description).capsules if (i, None, j) not in left_out)
+        pairs = tuple(
+            (i, j) for i, j in link_pairs(description).capsules if (i, None, j) not in left_out
+        )
         least = np.minimum(least, _from_itself(capsules, axes, pairs)[0])
     solids = [(k, item) for k, item in enumerate(obstacles) if isinstance(item, Obstacle)]
     for is_box in (False, True):
@@ -204,7 +235,10 @@ def smallest_distances(
 
 
 def _nearer(
-    capsules: tuple[LinkCapsule, ...], axes: Array, beside: Sequence[tuple[int, Obstacle]], least: Array
+    capsules: tuple[LinkCapsule, ...],
+    axes: Array,
+    beside: Sequence[tuple[int, Obstacle]],
+    least: Array,
 ) -> Array:
     """Return the smaller of ``least`` (N,), m, and the distances of capsules from obstacles, all boxes or none."""
     which = np.array([i for i, _ in beside])
@@ -239,7 +273,9 @@ def _nearer(
     return result
 
 
-def pair_distances(description: Description, q: Array, obstacles: Sequence[Obstacle | Floor], pair: Pair) -> Array:
+def pair_distances(
+    description: Description, q: Array, obstacles: Sequence[Obstacle | Floor], pair: Pair
+) -> Array:
     """Return the exact distances of one pair at states q (N, n), shape (N,), m."""
     capsules = link_capsules(description)
     axes = world_axes(description, q)
@@ -255,7 +291,10 @@ def pair_distances(description: Description, q: Array, obstacles: Sequence[Obsta
 
 
 def _from_one(
-    description: Description, capsules: tuple[LinkCapsule, ...], axes: Array, obstacle: Obstacle | Floor
+    description: Description,
+    capsules: tuple[LinkCapsule, ...],
+    axes: Array,
+    obstacle: Obstacle | Floor,
 ) -> Nearest:
     """Return the distances from one obstacle; the candidates are those of `_pair_names`."""
     if isinstance(obstacle, Floor):
@@ -264,7 +303,10 @@ def _from_one(
     radii = np.array([capsules[i].radius for i in beside])
     moving = axes[:, list(beside)]
     low, high = axis_bounds(Solids.of([obstacle] * len(beside)), moving)
-    return _exact((low - radii, high - radii), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle))
+    return _exact(
+        (low - radii, high - radii),
+        lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle),
+    )
 
 
 def _heights(
@@ -283,14 +325,19 @@ def _heights(
     return heights
 
 
-def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]) -> Nearest:
+def _from_itself(
+    capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]
+) -> Nearest:
     """Return the distances between links; the candidates are the pairs."""
     first = [i for i, _ in pairs]
     second = [j for _, j in pairs]
     radii = [(capsules[i].radius, capsules[j].radius) for i, j in pairs]
-    gaps = segment_distances(axes[:, first], axes[:, second]) - np.array(radii).reshape(-1, 2).sum(axis=1)
+    gaps = segment_distances(axes[:, first], axes[:, second]) - np.array(radii).reshape(-1, 2).sum(
+        axis=1
+    )
     return _exact(
-        (gaps, gaps), lambda k, rows: capsule_distances(radii[k], axes[rows, first[k]], axes[rows, second[k]])
+        (gaps, gaps),
+        lambda k, rows: capsule_distances(radii[k], axes[rows, first[k]], axes[rows, second[k]]),
     )
 
 
@@ -323,7 +370,9 @@ def _pair_names(
     return [(capsules[i].name, obstacle.name) for i in ends]
 
 
-def _worst(every: Array, found: list[Nearest], names: list[list[tuple[str, str]]]) -> tuple[str, str] | None:
+def _worst(
+    every: Array, found: list[Nearest], names: list[list[tuple[str, str]]]
+) -> tuple[str, str] | None:
     if not every.size or not np.isfinite(every.min()):
         return None
     state, k = (int(x) for x in np.unravel_index(np.argmin(every), every.shape))

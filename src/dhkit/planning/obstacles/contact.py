@@ -15,7 +15,12 @@ from dhkit.description import Array, Description, joint_vector, takes_robot, wor
 from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import capsules_beside, ends_above, link_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, Solids, check_obstacles
-from dhkit.planning.obstacles.solids import axis_bounds, nearest_of_bodies, nearest_to_obstacle, segment_distances
+from dhkit.planning.obstacles.solids import (
+    axis_bounds,
+    nearest_of_bodies,
+    nearest_to_obstacle,
+    segment_distances,
+)
 
 Measured = TypeVar("Measured")
 """Two bodies of links, or one and an obstacle."""
@@ -77,7 +82,9 @@ class NearestObstacle(NamedTuple):
 
 
 @takes_robot
-def nearest_obstacle(description: Description, q: ArrayLike, obstacles: Scene) -> NearestObstacle | None:
+def nearest_obstacle(
+    description: Description, q: ArrayLike, obstacles: Scene
+) -> NearestObstacle | None:
     """Return the link and the obstacle nearest to each other in one state; None if there are none.
 
     The links are those of which planning checks some part against an obstacle: not the base, and not a foot that stands
@@ -111,7 +118,9 @@ def nearest_obstacle(description: Description, q: ArrayLike, obstacles: Scene) -
         of_bodies = _bounds_beside(description, axes, obstacle)
         bounds += [(bound, (body, obstacle)) for body, bound in of_bodies.items()]
 
-    def measure(pair: tuple[LinkBody, Obstacle | Floor], enough: float) -> tuple[float, Array] | None:
+    def measure(
+        pair: tuple[LinkBody, Obstacle | Floor], enough: float
+    ) -> tuple[float, Array] | None:
         return nearest_to_obstacle(description, frames, *pair, enough)
 
     found = _nearest_in_order(sorted(bounds, key=lambda entry: entry[0]), measure)
@@ -128,7 +137,8 @@ class _Nearest(Generic[Measured]):
 
 
 def _nearest_in_order(
-    bounds: Sequence[tuple[float, Measured]], measure: Callable[[Measured, float], tuple[float, Array] | None]
+    bounds: Sequence[tuple[float, Measured]],
+    measure: Callable[[Measured, float], tuple[float, Array] | None],
 ) -> _Nearest[Measured] | None:
     """Return the nearest of pairs, measured in the order of the lower bounds of their distances, m.
 
@@ -147,7 +157,9 @@ def _nearest_in_order(
     return nearest
 
 
-def _bounds_beside(description: Description, axes: Array, obstacle: Obstacle | Floor) -> dict[LinkBody, float]:
+def _bounds_beside(
+    description: Description, axes: Array, obstacle: Obstacle | Floor
+) -> dict[LinkBody, float]:
     """Return lower bounds of the distances of bodies from an obstacle, m: those of all their capsules with ``axes``."""
     capsules = link_capsules(description)
     if isinstance(obstacle, Floor):
@@ -177,7 +189,9 @@ def may_touch(description: Description, q: ArrayLike) -> tuple[LinkBody, LinkBod
     capsules = link_capsules(description)
     axes = world_axes(description, joint_vector(description, q)[None])[0]
     pairs = [
-        (i, j) for (i, first), (j, second) in combinations(enumerate(capsules), 2) if abs(second.link - first.link) > 1
+        (i, j)
+        for (i, first), (j, second) in combinations(enumerate(capsules), 2)
+        if abs(second.link - first.link) > 1
     ]
     if not pairs:
         return None

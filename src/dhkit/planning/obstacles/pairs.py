@@ -174,7 +174,9 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
         has_wide = False
         same = np.inf
         for i, j in product(of_body[a], of_body[b]):
-            gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
+            gap = (
+                segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
+            )
             if np.mean(gap < 0) > OVERLAP_SHARE:
                 has_wide = True
                 continue
@@ -183,7 +185,9 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
                 narrow.append((i, j))
             else:
                 same = min(same, float(gap.min()), least)
-        overlaps = has_wide and bool((shape_distances(description, q[:SHAPE_SAMPLES], (a, b), enough=0.0) < 0).all())
+        overlaps = has_wide and bool(
+            (shape_distances(description, q[:SHAPE_SAMPLES], (a, b), enough=0.0) < 0).all()
+        )
         touches_by_construction = overlaps and are_connected
         if touches_by_construction:
             continue
@@ -242,12 +246,16 @@ def _axes_with_locked_joints_turned(description: Description, q: Array) -> Array
     for link in sorted(last, reverse=True):
         for joint in range(last[link], 0, -1):
             # Joint k of a link's bodies turns about z of body k - 1, in the modified convention about z of body k.
-            T = frames.get((link, joint - 1 if description.convention is Convention.STANDARD else joint))
+            T = frames.get(
+                (link, joint - 1 if description.convention is Convention.STANDARD else joint)
+            )
             carried = []
             for i, body in enumerate(bodies):
                 if body.link > link or (body.link == link and body.number >= joint):
                     carried.append(i)
-            if T is None:  # of a link without shapes: its axis is not known, and all links after it move
+            if (
+                T is None
+            ):  # of a link without shapes: its axis is not known, and all links after it move
                 size = float(np.ptp(axes.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
                 axes[:, carried] += rng.uniform(-size, size, (count, 1, 1, 3))
                 continue
@@ -315,7 +323,9 @@ def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, 
 
 
 @lru_cache(maxsize=MAX_OBSTACLES)
-def _capsules_beside(description: Description, meshes: MeshVersions, obstacle: Obstacle) -> tuple[int, ...]:
+def _capsules_beside(
+    description: Description, meshes: MeshVersions, obstacle: Obstacle
+) -> tuple[int, ...]:
     capsules = link_capsules(description)
     axes = _axes_in_whole_turns(description)
 
@@ -341,7 +351,9 @@ def ends_above(description: Description, height: float) -> tuple[tuple[int, int]
 
 
 @lru_cache(maxsize=256)
-def _ends_above(description: Description, meshes: MeshVersions, height: float) -> tuple[tuple[int, int], ...]:
+def _ends_above(
+    description: Description, meshes: MeshVersions, height: float
+) -> tuple[tuple[int, int], ...]:
     capsules = link_capsules(description)
     axes = _axes_in_whole_turns(description)
 
@@ -371,7 +383,9 @@ def standing(description: Description, obstacle: Obstacle | Floor) -> tuple[Stan
 
 
 @lru_cache(maxsize=MAX_OBSTACLES)
-def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle | Floor) -> tuple[Standing, ...]:
+def _standing(
+    description: Description, meshes: MeshVersions, obstacle: Obstacle | Floor
+) -> tuple[Standing, ...]:
     capsules = link_capsules(description)
     q = _configurations(description)[:STANDING_SAMPLES]
     axes = world_axes(description, q)
@@ -404,7 +418,9 @@ def _configurations(description: Description, whole_turns: bool = False) -> Arra
     low = np.minimum(lower, upper)
     high = np.maximum(lower, upper)
     # A joint whose range is a point may move by the limits of a motion.
-    least = np.where(numbers.prismatic, LEAST_STROKE * max(description.reach, LEAST_STROKE), LEAST_TURN)
+    least = np.where(
+        numbers.prismatic, LEAST_STROKE * max(description.reach, LEAST_STROKE), LEAST_TURN
+    )
     if whole_turns:
         least = np.where(numbers.prismatic, least, 2 * np.pi)
     widened = np.maximum(least - (high - low), 0.0) / 2

@@ -67,7 +67,9 @@ class Obstacle:
             T_world_obstacle = check_pose(array, "box: at")
         else:
             T_world_obstacle = np.eye(4)
-            T_world_obstacle[:3, 3] = _point("box: at", at, "a pose, shape (4, 4), or a position, shape (3,), finite")
+            T_world_obstacle[:3, 3] = _point(
+                "box: at", at, "a pose, shape (4, 4), or a position, shape (3,), finite"
+            )
         return cls._placed(Box((exact(x), exact(y), exact(z))), T_world_obstacle, name)
 
     @classmethod
@@ -96,7 +98,9 @@ class Obstacle:
         return cls._placed(Sphere(exact(r)), T_world_obstacle, name)
 
     @classmethod
-    def capsule(cls, radius: float, start: ArrayLike, end: ArrayLike, name: str = "capsule") -> Obstacle:
+    def capsule(
+        cls, radius: float, start: ArrayLike, end: ArrayLike, name: str = "capsule"
+    ) -> Obstacle:
         """Return a cylinder with half balls on its ends.
 
         Parameters
@@ -120,7 +124,9 @@ class Obstacle:
         last = _point("capsule: end", end)
         length = float(np.linalg.norm(last - first))
         if not length > 0:
-            raise ValueError(f"capsule: start and end are both {_shown(first)}; expected two points (or a sphere)")
+            raise ValueError(
+                f"capsule: start and end are both {_shown(first)}; expected two points (or a sphere)"
+            )
         T_world_obstacle = np.eye(4)
         T_world_obstacle[:3, :3] = rotations_onto((last - first) / length)
         T_world_obstacle[:3, 3] = (first + last) / 2
@@ -128,7 +134,9 @@ class Obstacle:
 
     def __repr__(self) -> str:
         kind = type(self.geometry).__name__.lower()
-        return repr_line(f"Obstacle {self.name[:60]}", summary=f"{kind} about {listed(self.centre)} m")
+        return repr_line(
+            f"Obstacle {self.name[:60]}", summary=f"{kind} about {listed(self.centre)} m"
+        )
 
     @classmethod
     def _placed(cls, geometry: Solid, T_world_obstacle: Array, name: str) -> Obstacle:
@@ -207,7 +215,9 @@ def check_obstacles(obstacles: Scene) -> tuple[Obstacle | Floor, ...]:
         More than one floor.
     """
     if isinstance(obstacles, Obstacle | Floor) or not isinstance(obstacles, Sequence):
-        raise TypeError(f"obstacles is {type(obstacles).__name__}; expected a list of Obstacle and Floor")
+        raise TypeError(
+            f"obstacles is {type(obstacles).__name__}; expected a list of Obstacle and Floor"
+        )
     for item in obstacles:
         if not isinstance(item, Obstacle | Floor):
             raise TypeError(f"obstacles: found {type(item).__name__}; expected Obstacle or Floor")
@@ -233,7 +243,9 @@ def _sizes(name: str, value: ArrayLike, shape: tuple[int, ...], expected: str) -
     return [float(x) for x in array.ravel()]
 
 
-def _point(name: str, value: ArrayLike, expected: str = "a finite position, shape (3,), m") -> Array:
+def _point(
+    name: str, value: ArrayLike, expected: str = "a finite position, shape (3,), m"
+) -> Array:
     array = number_array(value, name, "(3,)")
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         found = _shown(array) if array.shape == (3,) else f"of shape {array.shape}"
@@ -307,7 +319,9 @@ class Solids:
 
             h(n) = n . c + sum_a |n . e_a| + r.
         """
-        halves = self.placements[which, :3, :3] * self.half_sizes[which, None]  # half edges, as columns
+        halves = (
+            self.placements[which, :3, :3] * self.half_sizes[which, None]
+        )  # half edges, as columns
         along = np.abs(np.einsum("ix,jxa->ija", normals, halves)).sum(axis=2)
         reach: Array = normals @ self.centres[which].T + along + self.radii[which]
         return reach

@@ -87,7 +87,10 @@ class Separation:
     """
 
     def __init__(
-        self, description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool = False
+        self,
+        description: Description,
+        obstacles: Sequence[Obstacle | Floor],
+        self_collision: bool = False,
     ) -> None:
         self.description = description
         self.obstacles = tuple(obstacles)
@@ -118,11 +121,15 @@ class Separation:
             return
         part = slice(len(self.pairs), len(self.pairs) + len(pairs))
         capsules = np.array([pair.capsule for pair in pairs])
-        others = [None if pair.obstacle is None else self.obstacles[pair.obstacle] for pair in pairs]
+        others = [
+            None if pair.obstacle is None else self.obstacles[pair.obstacle] for pair in pairs
+        ]
         solids = [item for item in others if isinstance(item, Obstacle)]
         floor = others[0] if isinstance(others[0], Floor) else None
         second = np.array([-1 if pair.other is None else pair.other for pair in pairs])
-        self._groups.append(_Group(part, capsules, second, Solids.of(solids) if solids else None, floor))
+        self._groups.append(
+            _Group(part, capsules, second, Solids.of(solids) if solids else None, floor)
+        )
         self.pairs += pairs
 
     def gaps(self, q: Array, near: float = np.inf) -> Gaps:
@@ -144,7 +151,9 @@ class Separation:
         smallest: Array = self.gaps(q[:, None], near).gap.min(axis=1, initial=np.inf)
         return smallest
 
-    def rows(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array, fixed: Container[int] = ()) -> list[PlaneRow]:
+    def rows(
+        self, gaps: Gaps, active: NDArray[np.bool_], margins: Array, fixed: Container[int] = ()
+    ) -> list[PlaneRow]:
         """Return the rows that keep pairs apart in the intervals of a mesh, at both of their knots.
 
         Parameters
@@ -195,7 +204,9 @@ class Separation:
                 for k in np.flatnonzero(has_several):
                     # The nearest first.
                     solids = beside[active_in_group[k, beside]]
-                    solids = solids[np.argsort(gaps.gap[k, solids + group.part.start], kind="stable")]
+                    solids = solids[
+                        np.argsort(gaps.gap[k, solids + group.part.start], kind="stable")
+                    ]
                     p = solids + group.part.start
                     needed[k, p] = _needed_planes(
                         group.solids, solids, gaps.normal[k, p], gaps.level[k, p], margins[k, p]
@@ -235,7 +246,9 @@ class Separation:
             on_axis, nearest = self._above_floor(own, group, p)
             ends = on_axis[:, [0, -1], None]
         elif solids is not None and solids.are_boxes:
-            on_axis, nearest = nearest_on_box(own, solids.placements[p][:, None], solids.half_sizes[p][:, None])
+            on_axis, nearest = nearest_on_box(
+                own, solids.placements[p][:, None], solids.half_sizes[p][:, None]
+            )
         elif solids is not None:
             radius = solids.radii[p]
             on_axis, nearest = nearest_points(own, solids.axes[p][:, None])
@@ -287,7 +300,9 @@ class _Nearest(NamedTuple):
     """Radii about the axes, shape (m,), m."""
 
 
-def _keep(found: Gaps, here: tuple[Indices, Indices], touched: _Nearest, other: _Nearest, ends: Array) -> None:
+def _keep(
+    found: Gaps, here: tuple[Indices, Indices], touched: _Nearest, other: _Nearest, ends: Array
+) -> None:
     """Write gaps, each at its smallest, and the planes that are kept best.
 
     Parameters
@@ -362,7 +377,9 @@ def _needed_planes(
         Distances of the link from each plane, shape (P,), m.
     """
     # Entry (i, j): whether plane i makes plane j needless.
-    shields = solids.reach(which, normal) + required <= (level + required)[:, None] + BEHIND_TOLERANCE
+    shields = (
+        solids.reach(which, normal) + required <= (level + required)[:, None] + BEHIND_TOLERANCE
+    )
     needed = np.zeros(len(which), dtype=bool)
     is_shielded = np.zeros(len(which), dtype=bool)
     for i in range(len(which)):

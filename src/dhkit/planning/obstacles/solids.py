@@ -203,7 +203,9 @@ def _dot(first: Array, second: Array) -> Array:
 
 def _quotient(numerator: Array, denominator: Array) -> Array:
     """Return a quotient, 0 where the denominator is 0."""
-    quotient: Array = np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > ZERO)
+    quotient: Array = np.divide(
+        numerator, denominator, out=np.zeros_like(numerator), where=denominator > ZERO
+    )
     return quotient
 
 
@@ -242,7 +244,9 @@ def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
     capsule, places = _capsule(coal, radius, axes)
     request = distance_request()
     result = coal.DistanceResult()
-    return np.array([signed_distance(coal, capsule, own, solid, place, request, result) for own in places])
+    return np.array(
+        [signed_distance(coal, capsule, own, solid, place, request, result) for own in places]
+    )
 
 
 def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -> Array:
@@ -259,10 +263,14 @@ def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -
     request = distance_request()
     result = coal.DistanceResult()
     pairs = zip(places, other_places, strict=True)
-    return np.array([signed_distance(coal, one, own, other, place, request, result) for own, place in pairs])
+    return np.array(
+        [signed_distance(coal, one, own, other, place, request, result) for own, place in pairs]
+    )
 
 
-def signed_distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
+def signed_distance(
+    coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any
+) -> float:
     """Return the signed distance of two of coal's shapes at poses T1 and T2, m; ``result`` is a scratch value."""
     found = _distance(coal, first, T1, second, T2, request, result)
     if found > FAILED:
@@ -275,7 +283,9 @@ def signed_distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any,
     return UNKNOWN_DEPTH
 
 
-def _distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
+def _distance(
+    coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any
+) -> float:
     result.clear()  # coal keeps the smallest of a result's queries
     return float(coal.distance(first, T1, second, T2, request, result))
 
@@ -374,7 +384,10 @@ def shape_distances(
 
 
 def nearest_of_bodies(
-    description: Description, frames: Array, bodies: tuple[LinkBody, LinkBody], enough: float = np.inf
+    description: Description,
+    frames: Array,
+    bodies: tuple[LinkBody, LinkBody],
+    enough: float = np.inf,
 ) -> tuple[float, Array] | None:
     """Return the signed distance between the shapes of two bodies, m, and the points where they are nearest.
 
@@ -403,7 +416,11 @@ def nearest_of_bodies(
 
 
 def nearest_to_obstacle(
-    description: Description, frames: Array, body: LinkBody, obstacle: Obstacle | Floor, enough: float = np.inf
+    description: Description,
+    frames: Array,
+    body: LinkBody,
+    obstacle: Obstacle | Floor,
+    enough: float = np.inf,
 ) -> tuple[float, Array] | None:
     """Return the signed distance between the shapes of a body and an obstacle, m, and where they are nearest.
 
@@ -427,7 +444,9 @@ def nearest_to_obstacle(
         coal is not installed, or a mesh cannot be read.
     """
     solid = (
-        _PlacedSolid(_floor_solid(obstacle), np.eye(4)) if isinstance(obstacle, Floor) else _obstacle_solid(obstacle)
+        _PlacedSolid(_floor_solid(obstacle), np.eye(4))
+        if isinstance(obstacle, Floor)
+        else _obstacle_solid(obstacle)
     )
     return _nearest_of_solids(_placed_solids(description, frames, body), [solid], enough)
 
@@ -457,7 +476,9 @@ def _floor_solid(floor: Floor) -> _Solid:
         is_up = n[..., 2] >= 1 - SHORT
         return np.where(is_up, floor.height, np.inf)
 
-    return _Solid(coal_module().Halfspace(np.array([0.0, 0.0, 1.0]), floor.height), np.eye(4), extent)
+    return _Solid(
+        coal_module().Halfspace(np.array([0.0, 0.0, 1.0]), floor.height), np.eye(4), extent
+    )
 
 
 def _nearest_of_solids(
@@ -558,7 +579,9 @@ def _primitive(geometry: Sphere | Capsule | Cylinder | Box, T: Array) -> _Solid:
             r = float(geometry.radius)
             half = float(geometry.length) / 2
             shape = coal.Cylinder(r, 2 * half)
-            return _Solid(shape, T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2]))
+            return _Solid(
+                shape, T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2])
+            )
     edges = np.array([float(edge) for edge in geometry.size])
     return _Solid(coal.Box(*edges.tolist()), T, lambda n: np.abs(n) @ (edges / 2))
 

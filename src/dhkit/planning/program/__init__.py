@@ -1,7 +1,22 @@
 """Nonlinear programs of tasks, in blocks of variables and rows, and the optimizer that solves them."""
 
-from dhkit.planning.program.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
-from dhkit.planning.program.mesh import MIN_LEG_INTERVALS, Curve, Knots, Mesh, corrected, knots_along
+from dhkit.planning.program.blocks import (
+    Block,
+    BlockProgram,
+    Indices,
+    LocalFunction,
+    RowKind,
+    Rows,
+    Scaling,
+)
+from dhkit.planning.program.mesh import (
+    MIN_LEG_INTERVALS,
+    Curve,
+    Knots,
+    Mesh,
+    corrected,
+    knots_along,
+)
 from dhkit.planning.program.motion_program import (
     SMALL_ARM_JOINTS,
     MotionProgram,
@@ -21,7 +36,13 @@ from dhkit.planning.program.optimization_program import (
     worst_row,
 )
 from dhkit.planning.program.problem import Problem
-from dhkit.planning.program.solver import Progress, ProgressCall, Solution, Solver, delayed_interrupts
+from dhkit.planning.program.solver import (
+    Progress,
+    ProgressCall,
+    Solution,
+    Solver,
+    delayed_interrupts,
+)
 from dhkit.planning.program.work import MAX_ITERATIONS, SearchLimitError, Work
 
 __all__ = [

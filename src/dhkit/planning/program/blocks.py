@@ -39,7 +39,9 @@ class LocalFunction:
         Expression of shape (1, 1) that is added to the objective.
     """
 
-    def __init__(self, z: casadi.SX, p: casadi.SX, rows: casadi.SX, cost: casadi.SX | None = None) -> None:
+    def __init__(
+        self, z: casadi.SX, p: casadi.SX, rows: casadi.SX, cost: casadi.SX | None = None
+    ) -> None:
         import casadi
 
         cost = casadi.SX(1, 1) if cost is None else cost
@@ -238,16 +240,24 @@ class BlockProgram:
                 gradient.add(at[i], np.zeros_like(at[i]), function.gradient.map(points)(*local))
             i, j = function.hessian_at
             if len(i):
-                of_rows = casadi.reshape(multipliers[begin : begin + block.count], function.count, points)
-                values = function.hessian.map(points)(*local, of_rows, casadi.repmat(weight, 1, points))
-                hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)  # the upper triangle
+                of_rows = casadi.reshape(
+                    multipliers[begin : begin + block.count], function.count, points
+                )
+                values = function.hessian.map(points)(
+                    *local, of_rows, casadi.repmat(weight, 1, points)
+                )
+                hessian.add(
+                    np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values
+                )  # the upper triangle
             begin += block.count
         scaled_rows = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
 
         inputs = {"x": y, "p": given}
         with_weights = {**inputs, "lam_f": weight, "lam_g": scaled_multipliers}
 
-        def function_of(arguments: dict[str, casadi.MX], results: dict[str, casadi.MX]) -> casadi.Function:
+        def function_of(
+            arguments: dict[str, casadi.MX], results: dict[str, casadi.MX]
+        ) -> casadi.Function:
             symbols = list(arguments.values())
             values = list(results.values())
             return casadi.Function("program", symbols, values, list(arguments), list(results))
@@ -280,7 +290,9 @@ class _Nonzeros:
         self._columns.append(columns.ravel(order="F"))
         self._values.append(casadi.vec(values))
 
-    def matrix(self, row_factors: casadi.MX | None = None, column_factors: casadi.MX | None = None) -> casadi.MX:
+    def matrix(
+        self, row_factors: casadi.MX | None = None, column_factors: casadi.MX | None = None
+    ) -> casadi.MX:
         """Return the matrix, with its rows and columns multiplied by factors, shape (rows, 1) and (columns, 1)."""
         import casadi
 
@@ -299,7 +311,9 @@ class _Nonzeros:
             nonzeros = values[np.argsort(place).tolist()]
         else:
             # Values at the same place are added, by a matrix with a 1 at (place, value).
-            adding = casadi.Sparsity.triplet(len(positions), len(place), place.tolist(), list(range(len(place))))
+            adding = casadi.Sparsity.triplet(
+                len(positions), len(place), place.tolist(), list(range(len(place)))
+            )
             nonzeros = casadi.DM(adding, 1.0) @ values
         if row_factors is not None and column_factors is not None:
             nonzeros = nonzeros * row_factors[i] * column_factors[j]

@@ -216,7 +216,9 @@ class Knots:
         return Interval(h, self.q[:-1], self.qd[:-1], *mesh.curve.values(self.qdd))
 
 
-def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, fixed_ends: bool) -> Trajectory:
+def assemble_trajectory(
+    description: Description, mesh: Mesh, knots: Knots, *, fixed_ends: bool
+) -> Trajectory:
     """Return the motion of a program's accelerations.
 
     Ipopt leaves gaps of about 1e-8 between intervals, which would add up at the goal. The accelerations are therefore
@@ -271,7 +273,9 @@ def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends
     # q(t) = q + qd t + a t^2 / 2 + j0 t^3 / 6 + (j1 - j0) / h t^4 / 24, with a jerk from j0 to j1.
     interval = Interval(h[:, None], q[:-1], qd[:-1], *curve.values(A))
     j0, j1 = interval.jerks
-    coefficients = np.stack([q[:-1], qd[:-1], interval.a / 2, j0 / 6, (j1 - j0) / (24 * interval.h)], axis=1)
+    coefficients = np.stack(
+        [q[:-1], qd[:-1], interval.a / 2, j0 / 6, (j1 - j0) / (24 * interval.h)], axis=1
+    )
     degree = len(curve.column_weights) + 1
     return coefficients[:, : degree + 1]
 

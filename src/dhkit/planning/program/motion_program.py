@@ -13,7 +13,13 @@ from dhkit.planning.criteria import Limit, LoadedArm, Objective, States, cost_of
 from dhkit.planning.obstacles import PlaneRow
 from dhkit.planning.program.blocks import Indices
 from dhkit.planning.program.mesh import Curve, Knots, Mesh, assemble_trajectory, knots_along
-from dhkit.planning.program.optimization_program import Arguments, Margins, OptimizationProgram, Starts, Task
+from dhkit.planning.program.optimization_program import (
+    Arguments,
+    Margins,
+    OptimizationProgram,
+    Starts,
+    Task,
+)
 from dhkit.planning.program.problem import USUAL_MOVE, Problem
 from dhkit.planning.program.solver import Solver
 from dhkit.trajectories import Limits, Trajectory
@@ -138,7 +144,9 @@ def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:
     rng = np.random.default_rng(seed)
     limits = task.limits
     legs = len(durations)
-    half_turn_or_reach = np.where(task.arm.numbers.prismatic, max(task.arm.reach, MIN_STROKE), np.pi)
+    half_turn_or_reach = np.where(
+        task.arm.numbers.prismatic, max(task.arm.reach, MIN_STROKE), np.pi
+    )
     width = limits.upper - limits.lower
     half_range = np.where(np.isfinite(width), width / 2, half_turn_or_reach)
 
@@ -173,7 +181,9 @@ class MotionProgram(OptimizationProgram[Knots]):
         self.problem = problem
         self.mesh = problem.mesh
         self.blocks, self._planes = problem.with_planes(planes)
-        self.solver = Solver(self.blocks, len(self.mesh.legs), tolerance=CONVERGENCE[self.mesh.curve])
+        self.solver = Solver(
+            self.blocks, len(self.mesh.legs), tolerance=CONVERGENCE[self.mesh.curve]
+        )
         self.intervals = self.mesh.intervals
         self.small_step = SMALL_STEP[self.mesh.curve]
 
@@ -195,14 +205,21 @@ class MotionProgram(OptimizationProgram[Knots]):
         is_compared = has_detours and task.objective.has_time and task.span >= USUAL_MOVE
         durations = self.guessed_durations(task)
         guesses: list[Callable[[], Knots]] = []
-        if warm is not None and len(self.mesh.legs) == 1:  # the times of via points in ``warm`` are not known
+        if (
+            warm is not None and len(self.mesh.legs) == 1
+        ):  # the times of via points in ``warm`` are not known
             guesses.append(partial(knots_along, warm, self.mesh, np.array([warm.duration])))
         guesses.append(partial(straight_knots, task, self.mesh, durations))
         if is_compared or task.duration is not None:
-            guesses += [partial(detour, task, self.mesh, durations, seed) for seed in range(DETOURS)]
+            guesses += [
+                partial(detour, task, self.mesh, durations, seed) for seed in range(DETOURS)
+            ]
         number_compared = len(guesses) if is_compared else 0
         if task.duration is None:
-            guesses += [partial(straight_knots, task, self.mesh, durations * factor) for factor in RESTART_FACTORS]
+            guesses += [
+                partial(straight_knots, task, self.mesh, durations * factor)
+                for factor in RESTART_FACTORS
+            ]
         return Starts(guesses, number_compared)
 
     def next_guess(self, guess: Knots, found: Knots) -> Knots:
@@ -234,7 +251,10 @@ class MotionProgram(OptimizationProgram[Knots]):
         """Return the factor, at least 1, of the durations with which the straight path costs least."""
         largest = MAX_GUESSED_DURATION / max(float(durations.sum()), 1e-6)
         factors = np.geomspace(1.0, max(largest, 1.0), GUESSED_DURATIONS)
-        motions = (self._assembled(task, straight_knots(task, self.mesh, durations * factor)) for factor in factors)
+        motions = (
+            self._assembled(task, straight_knots(task, self.mesh, durations * factor))
+            for factor in factors
+        )
         costs = [cost_of(task.objective, motion, task.loaded, task.friction) for motion in motions]
         return float(factors[int(np.argmin(costs))])
 
@@ -331,7 +351,9 @@ class MotionProgram(OptimizationProgram[Knots]):
         return knots_along(trajectory, self.mesh, trajectory.breaks[list(self.mesh.ends)])
 
 
-def curves_for(n: int, objective: Objective, *, jerk_counts: bool, friction: bool) -> tuple[Curve, ...]:
+def curves_for(
+    n: int, objective: Objective, *, jerk_counts: bool, friction: bool
+) -> tuple[Curve, ...]:
     """Return the curves of accelerations that are tried in turn.
 
     =====================================  ==================================

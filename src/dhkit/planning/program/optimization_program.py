@@ -196,7 +196,9 @@ class OptimizationProgram(ABC, Generic[Iterate]):
     def place(self, interval: float) -> str:
         """Return a place of the motion as text, given by the index of an interval."""
 
-    def tightened(self, margins: Margins, more: dict[int, Array]) -> tuple[OptimizationProgram[Iterate], Margins]:
+    def tightened(
+        self, margins: Margins, more: dict[int, Array]
+    ) -> tuple[OptimizationProgram[Iterate], Margins]:
         """Return the program and the margins for another solution; ``more`` are margins to add, (intervals, rows)."""
         return self, margins.raised(more)
 
@@ -255,7 +257,9 @@ class RowViolation(NamedTuple):
     """Distance from its bounds, in the unit of the row; infinite if the row is not a number."""
 
 
-def worst_row(solution: Solution, blocks: BlockProgram, bounds: tuple[Array, Array]) -> RowViolation:
+def worst_row(
+    solution: Solution, blocks: BlockProgram, bounds: tuple[Array, Array]
+) -> RowViolation:
     """Return the row with the largest violation of bounds (rows,)."""
     lower, upper = bounds
     misses = np.maximum(lower - solution.g, solution.g - upper)
@@ -272,7 +276,9 @@ def worst_row(solution: Solution, blocks: BlockProgram, bounds: tuple[Array, Arr
     ends = np.cumsum([rows.count for rows in block.rows])
     kind = int(np.searchsorted(ends, row, side="right"))
     rows = block.rows[kind]
-    return RowViolation(rows, row - int(ends[kind] - rows.count), float(interval), float(misses[worst]))
+    return RowViolation(
+        rows, row - int(ends[kind] - rows.count), float(interval), float(misses[worst])
+    )
 
 
 def limit_rows(
@@ -282,6 +288,8 @@ def limit_rows(
     rows = []
     for k, constraint in constraints:
         expression = constraint.checked_rows(point, parameters[k])
-        kind = Rows(RowKind.LIMIT, constraint.what, expression.numel(), k, of_joints=constraint.of_joints)
+        kind = Rows(
+            RowKind.LIMIT, constraint.what, expression.numel(), k, of_joints=constraint.of_joints
+        )
         rows.append((kind, expression))
     return rows

@@ -19,7 +19,15 @@ from dhkit.description import Array, Description
 from dhkit.planning.certificate import NO_AVOIDANCE, motion_constraints
 from dhkit.planning.criteria import LOAD, Constraint, Limit, Objective, Point
 from dhkit.planning.obstacles import PlaneRow
-from dhkit.planning.program.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
+from dhkit.planning.program.blocks import (
+    Block,
+    BlockProgram,
+    Indices,
+    LocalFunction,
+    RowKind,
+    Rows,
+    Scaling,
+)
 from dhkit.planning.program.mesh import Curve, Interval, Knots, Mesh
 from dhkit.planning.program.optimization_program import limit_rows
 from dhkit.symbolic import Friction
@@ -29,7 +37,12 @@ from dhkit.trajectories import Limits
 if TYPE_CHECKING:
     import casadi
 
-SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
+SMOOTHING_WEIGHTS = {
+    Curve.CONSTANT: 1e-3,
+    Curve.JUMPING: 1e-5,
+    Curve.LINEAR: 1e-4,
+    Curve.QUADRATIC: 1e-3,
+}
 """Weight of squared accelerations in objectives of time or energy, as a share of the objective: joints with spare time
 then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
 USUAL_MOVE = 0.1
@@ -131,7 +144,9 @@ class StatePoints:
         q, qd, qdd = at.middles
         if not qdd.size:  # quadratic accelerations: those at the middles are variables of the curve
             qdd = at.qdd[:, [mesh.curve.columns_of(i)[1] for i in range(mesh.intervals)]]
-        return ends._with_points(cls._of(q, qd, qdd, np.stack([k, k], axis=1), 2 / 3 * mesh.shares, mesh.leg))
+        return ends._with_points(
+            cls._of(q, qd, qdd, np.stack([k, k], axis=1), 2 / 3 * mesh.shares, mesh.leg)
+        )
 
     @classmethod
     def _ends_of_intervals(cls, mesh: Mesh, at: Variables, weight: float) -> StatePoints:
@@ -284,7 +299,9 @@ class Problem:
         self._every = dict(enumerate(motion_constraints(limits, NO_AVOIDANCE, constraints)))
 
         # Positions, rates and accelerations are variables; their limits are bounds, and rows inside intervals.
-        others = [pair for pair in self._every.items() if pair[0] >= Limit.TORQUE and pair[1].is_limiting]
+        others = [
+            pair for pair in self._every.items() if pair[0] >= Limit.TORQUE and pair[1].is_limiting
+        ]
         self.moving = tuple(pair for pair in others if pair[1].moving)
         self.places = tuple(pair for pair in others if not pair[1].moving)
         self.with_states = bool(self.moving) or objective.has_integral
@@ -320,7 +337,9 @@ class Problem:
     def _states_at_middles(self) -> bool:
         curve = self.mesh.curve
         has_constraints = any(k > Limit.CLEARANCE for k, _ in self.moving)
-        return curve in (Curve.LINEAR, Curve.QUADRATIC) or (curve is Curve.JUMPING and has_constraints)
+        return curve in (Curve.LINEAR, Curve.QUADRATIC) or (
+            curve is Curve.JUMPING and has_constraints
+        )
 
     def vector(self, knots: Knots, load: Array | None) -> Array:
         """Return the variables of a motion, shape (variables,), SI units; a payload's parameters are shape (10,)."""
@@ -348,7 +367,9 @@ class Problem:
         import casadi
 
         point = self.point
-        return casadi.Function("powers", [point.q, point.qd, point.qdd, point.load], [self._power], {"cse": True})
+        return casadi.Function(
+            "powers", [point.q, point.qd, point.qdd, point.load], [self._power], {"cse": True}
+        )
 
     def knots(self, x: Array) -> Knots:
         """Return the motion of variables, shape (variables,), SI units."""
@@ -372,7 +393,9 @@ class Problem:
 
         # A derivative of order k has the unit length / time^k.
         units = program.unscaled
-        for order, (at_knots, at_middles) in enumerate(zip((at.q, at.qd, at.qdd), at.middles, strict=True)):
+        for order, (at_knots, at_middles) in enumerate(
+            zip((at.q, at.qd, at.qdd), at.middles, strict=True)
+        ):
             units.unit[at_knots] = length / time**order
             units.unit[at_middles] = length / time**order
         units.unit[at.durations] = time
@@ -399,10 +422,14 @@ class Problem:
             len(self._weights),
         ]
         edges = np.cumsum([0, *counts])
-        load, *constraints, scale, usual, shares, weights = [np.arange(a, b) for a, b in pairwise(edges)]
+        load, *constraints, scale, usual, shares, weights = [
+            np.arange(a, b) for a, b in pairwise(edges)
+        ]
         return _ParameterIndices(load, constraints, scale, usual, shares, weights)
 
-    def parameters(self, load: Array | None, each: Sequence[Array], scale: float, usual: Array) -> Array:
+    def parameters(
+        self, load: Array | None, each: Sequence[Array], scale: float, usual: Array
+    ) -> Array:
         """Return the program's parameters as one array.
 
         Parameters
@@ -440,7 +467,9 @@ class Problem:
             intervals = np.clip(np.stack([knots - 1, knots], axis=1), 0, self.mesh.intervals - 1)
             parameters = (begin + np.arange(planes.size)).reshape(planes.shape).T
             kinds = (Rows(RowKind.PLANE, Limit.CLEARANCE.what, 1),)
-            blocks.append(Block(self._beside_plane(link, frame), at.q[:, knots], parameters, kinds, intervals))
+            blocks.append(
+                Block(self._beside_plane(link, frame), at.q[:, knots], parameters, kinds, intervals)
+            )
             values.append(planes.ravel())
             begin += planes.size
         return BlockProgram(at.count, begin, tuple(blocks)), np.concatenate(values)
@@ -507,7 +536,9 @@ class Problem:
         q_next = symbol("q_next", n)
         qd_next = symbol("qd_next", n)
         columns = [symbol(f"qdd{k}", n) for k in range(len(curve.columns_of(0)))]
-        lifted = [symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)]
+        lifted = [
+            symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)
+        ]
         scale = symbol("scale")
         usual = symbol("usual", n)
         interval = Interval(share * duration, q, qd, *curve.abc(columns))
@@ -523,7 +554,9 @@ class Problem:
         )
         rows = [(position, q_next - interval.q_end), (velocity, qd_next - interval.qd_end)]
         of_motion = (interval.q_middle, interval.qd_middle, b)
-        for kind, variable, value in zip((position, velocity, acceleration), lifted, of_motion, strict=True):
+        for kind, variable, value in zip(
+            (position, velocity, acceleration), lifted, of_motion, strict=True
+        ):
             if variable.numel():
                 rows.append((kind, variable - value))
 
@@ -548,7 +581,9 @@ class Problem:
             inside[Limit.JERK] = list(interval.jerks)[: 1 if curve is Curve.LINEAR else 2]
 
         # Rows of positions are in rad and m; the others are shares of their limits.
-        reciprocals = {limit: symbol(limit.what, n) for limit in inside if limit is not Limit.POSITION}
+        reciprocals = {
+            limit: symbol(limit.what, n) for limit in inside if limit is not Limit.POSITION
+        }
         for limit, values in inside.items():
             if limit is Limit.POSITION:
                 kind = Rows(RowKind.LIMIT, limit.what, n, limit, order=0, of_joints=True)
@@ -562,7 +597,9 @@ class Problem:
             # The mean square of accelerations relative to the usual ones. Intervals count by their shares of time,
             # since meshes are finer at their ends.
             weights = curve.column_weights
-            mean_square = sum(w * casadi.sumsqr(x * usual) for w, x in zip(weights, columns, strict=True))
+            mean_square = sum(
+                w * casadi.sumsqr(x * usual) for w, x in zip(weights, columns, strict=True)
+            )
             cost += SMOOTHING_WEIGHTS[curve] / (n * len(mesh.legs)) * share * mean_square
         if self.objective.has_jerk:
             # The jerk is linear from j0 to j1, so that the integral of its square is h/3 (j0^2 + j0 j1 + j1^2).
@@ -584,7 +621,9 @@ class Problem:
 
         p = casadi.vertcat(share, scale, usual, *reciprocals.values())
         indices = self._parameter_indices
-        common = np.concatenate([indices.scale, indices.usual, *(indices.constraints[limit] for limit in reciprocals)])
+        common = np.concatenate(
+            [indices.scale, indices.usual, *(indices.constraints[limit] for limit in reciprocals)]
+        )
         parameters = [indices.shares[None], np.tile(common[:, None], K)]
         return Block(
             LocalFunction(z, p, casadi.vertcat(*(value for _, value in rows)), cost),
@@ -643,7 +682,12 @@ class Problem:
             parameters = np.vstack([parameters, scales[None], indices.weights[None]])
 
         return Block(
-            LocalFunction(casadi.vertcat(*z), casadi.vertcat(*p), casadi.vertcat(*(value for _, value in rows)), cost),
+            LocalFunction(
+                casadi.vertcat(*z),
+                casadi.vertcat(*p),
+                casadi.vertcat(*(value for _, value in rows)),
+                cost,
+            ),
             np.vstack(variables),
             parameters,
             tuple(kind for kind, _ in rows),
@@ -665,7 +709,11 @@ class Problem:
         beside_knots = np.stack([k[:-1], k[1:]], axis=1)
         around_middles = np.stack([k, k], axis=1)
         return Block(
-            LocalFunction(self.point.q, casadi.vertcat(*symbols), casadi.vertcat(*(value for _, value in rows))),
+            LocalFunction(
+                self.point.q,
+                casadi.vertcat(*symbols),
+                casadi.vertcat(*(value for _, value in rows)),
+            ),
             np.hstack([at.q[:, 1:-1], at.middles.q]),
             np.tile(parameters, 2 * K - 1),
             tuple(kind for kind, _ in rows),
@@ -678,7 +726,10 @@ class Problem:
         import casadi
 
         constraints = self._parameter_indices.constraints
-        return [self.point.load, *(casadi.SX.sym(f"p{k}", len(at)) for k, at in enumerate(constraints))]
+        return [
+            self.point.load,
+            *(casadi.SX.sym(f"p{k}", len(at)) for k, at in enumerate(constraints)),
+        ]
 
 
 def _unit(rows: Rows, length: float, time: float, rate: float) -> float:

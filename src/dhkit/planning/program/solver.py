@@ -210,7 +210,9 @@ def delayed_interrupts() -> Iterator[list[BaseException]]:
 
     def keep(number: int, frame: FrameType | None) -> None:
         try:
-            handler(number, None)  # without the frame: wherever it is, what the handler raises is not lost
+            handler(
+                number, None
+            )  # without the frame: wherever it is, what the handler raises is not lost
         except BaseException as error:
             arrived.append(error)
 
@@ -270,7 +272,9 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             return 1
 
         def get_sparsity_in(self, i: int) -> casadi.Sparsity:
-            size = {"x": nx, "lam_x": nx, "f": 1, "g": ng, "lam_g": ng, "lam_p": np_}[casadi.nlpsol_out(i)]
+            size = {"x": nx, "lam_x": nx, "f": 1, "g": ng, "lam_g": ng, "lam_p": np_}[
+                casadi.nlpsol_out(i)
+            ]
             return casadi.Sparsity.dense(size, 1)
 
         def eval(self, arguments: Any) -> list[int]:
@@ -283,10 +287,14 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
                     return [1]
                 if self.progress is not None:
                     values = dict(zip(casadi.nlpsol_out(), arguments, strict=True))
-                    duration = float(self.units.variables(np.array(values["x"]).ravel())[:legs].sum())
+                    duration = float(
+                        self.units.variables(np.array(values["x"]).ravel())[:legs].sum()
+                    )
                     misses = _outside(np.array(values["g"]).ravel(), *self.bounds)
                     seconds = time.perf_counter() - self.started
-                    self.progress(Progress(self.iteration - 1, duration, misses, seconds, self.work.spent))
+                    self.progress(
+                        Progress(self.iteration - 1, duration, misses, seconds, self.work.spent)
+                    )
             except BaseException as error:  # Ipopt would discard it, KeyboardInterrupt too
                 self.raised = error
                 return [1]

@@ -51,12 +51,20 @@ class Work:
         ValueError
             A limit that is not positive, or not a number.
         """
-        if isinstance(max_iterations, bool) or not isinstance(max_iterations, Integral) or max_iterations < 1:
-            raise ValueError(f"max_iterations is {max_iterations!r}; expected a positive whole number")
+        if (
+            isinstance(max_iterations, bool)
+            or not isinstance(max_iterations, Integral)
+            or max_iterations < 1
+        ):
+            raise ValueError(
+                f"max_iterations is {max_iterations!r}; expected a positive whole number"
+            )
         if time_limit is None:
             time_limit = np.inf
         if not isinstance(time_limit, Real) or not float(time_limit) > 0:
-            raise ValueError(f"time_limit is {time_limit!r}; expected a positive number, s, or None")
+            raise ValueError(
+                f"time_limit is {time_limit!r}; expected a positive number, s, or None"
+            )
         return cls(int(max_iterations), float(time_limit), time.perf_counter())
 
     @property

@@ -34,7 +34,9 @@ def require_inside_limits(description: Description, limits: Limits, q: Array, wh
     if not excess.max() > LIMIT_ROUNDING:
         return
     i = int(np.argmax(excess))
-    words = violated_limit_text(q[i], limits.lower[i], limits.upper[i], slides=bool(description.numbers.prismatic[i]))
+    words = violated_limit_text(
+        q[i], limits.lower[i], limits.upper[i], slides=bool(description.numbers.prismatic[i])
+    )
     raise PlanningError(f"{where}: joint {description.joints[i].name} is at {words}")
 
 
@@ -53,7 +55,9 @@ def _require_speed(description: Description, limits: Limits, qd: Array, where: s
     is_prismatic = bool(description.numbers.prismatic[i])
     speed = joint_text(abs(qd[i]), slides=is_prismatic, rate="/s")
     bound = joint_text(limits.velocity[i], slides=is_prismatic, rate="/s")
-    raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {speed}, above its limit, {bound}")
+    raise PlanningError(
+        f"{where}: joint {description.joints[i].name} moves with {speed}, above its limit, {bound}"
+    )
 
 
 def require_holdable(description: LoadedArm, limits: Limits, q: Array, where: str) -> None:
@@ -79,7 +83,9 @@ def require_holdable(description: LoadedArm, limits: Limits, q: Array, where: st
     )
 
 
-def require_kept(description: LoadedArm, constraints: Sequence[Constraint], T_start: Array, place: Place) -> None:
+def require_kept(
+    description: LoadedArm, constraints: Sequence[Constraint], T_start: Array, place: Place
+) -> None:
     """Require that a place keeps the constraints at rest; ``T_start`` (4, 4), m, is the tool's pose at the start.
 
     Raises
@@ -95,10 +101,14 @@ def require_kept(description: LoadedArm, constraints: Sequence[Constraint], T_st
     for constraint in constraints:
         use = float(constraint.use(states, constraint.values(description, T_start)).max())
         if use > 1 + CONSTRAINT_ROUNDING:
-            raise PlanningError(f"{place.name}: its {constraint.what} is not allowed: {constraint.use_text(use)}")
+            raise PlanningError(
+                f"{place.name}: its {constraint.what} is not allowed: {constraint.use_text(use)}"
+            )
 
 
-def _require_bounded(description: Description, limits: Limits, objective: Objective, moves: Array) -> None:
+def _require_bounded(
+    description: Description, limits: Limits, objective: Objective, moves: Array
+) -> None:
     """Require limits that keep every moving joint of a time-optimal motion from jumping.
 
     Parameters

@@ -55,7 +55,10 @@ class Route:
 
 
 def parse_places(
-    description: Description, start: ArrayLike | str, via: Sequence[ArrayLike | str], goal: ArrayLike | str
+    description: Description,
+    start: ArrayLike | str,
+    via: Sequence[ArrayLike | str],
+    goal: ArrayLike | str,
 ) -> list[Place]:
     """Return the places of a motion in order, as :func:`_parse_place`; the start must be joint values (n,), rad and m.
 
@@ -68,13 +71,19 @@ def parse_places(
     """
     if not hasattr(via, "__len__"):
         raise TypeError(f"via is {type(via).__name__}; expected a list of places")
-    is_single = isinstance(via, str) or (len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0)
+    is_single = isinstance(via, str) or (
+        len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0
+    )
     between: list[Any] = [via] if is_single else list(via)
     names = ["start", *(f"via {k}" for k in range(1, len(between) + 1)), "goal"]
     values = (start, *between, goal)
-    places = [_parse_place(description, value, name) for value, name in zip(values, names, strict=True)]
+    places = [
+        _parse_place(description, value, name) for value, name in zip(values, names, strict=True)
+    ]
     if places[0].q is None:
-        raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
+        raise ValueError(
+            "start is a pose; expected joint values: choose one of inverse kinematics' solutions"
+        )
     return places
 
 
@@ -112,7 +121,10 @@ def _parse_place(description: Description, value: ArrayLike | str, name: str) ->
 
 
 def find_routes(
-    description: Description, limits: Limits, places: Sequence[Place], coordinates: Sequence[str] | None = None
+    description: Description,
+    limits: Limits,
+    places: Sequence[Place],
+    coordinates: Sequence[str] | None = None,
 ) -> list[Route]:
     """Return the routes through all places, sorted by their lower bounds of the duration.
 
@@ -147,7 +159,11 @@ def find_routes(
 
 
 def _configurations(
-    description: Description, limits: Limits, place: Place, near: Array | None, coordinates: Sequence[str] | None
+    description: Description,
+    limits: Limits,
+    place: Place,
+    near: Array | None,
+    coordinates: Sequence[str] | None,
 ) -> list[tuple[Array, str]]:
     if place.q is not None:
         return [(place.q, "")]
@@ -168,7 +184,9 @@ def _configurations(
         raise ValueError(f"coordinates is {coordinates!r}; {description.name} meets {met}")
     if not np.isfinite(every).all(axis=-1).any():
         if is_proved:
-            problem = f"no joint values bring the tool to this pose; {_position_text(T)} is out of reach"
+            problem = (
+                f"no joint values bring the tool to this pose; {_position_text(T)} is out of reach"
+            )
         else:
             problem = (
                 f"no joint values were found that bring the tool to this pose, at {_position_text(T)}; "
@@ -192,7 +210,9 @@ def _configurations(
     ]
 
 
-def _require_met(description: Description, place: Place, every: Array, met: tuple[str, ...]) -> None:
+def _require_met(
+    description: Description, place: Place, every: Array, met: tuple[str, ...]
+) -> None:
     """Require that a solution has the tool at the pose of a place; arms of fewer freedoms meet some coordinates alone.
 
     Raises
@@ -232,7 +252,9 @@ def _excess(description: Description, limits: Limits, every: Array) -> str:
     return f"at best joint {description.joints[i].name} by {words}"
 
 
-def _iterative_solutions(description: Description, T: Array, near: Array | None) -> tuple[Array, list[str]]:
+def _iterative_solutions(
+    description: Description, T: Array, near: Array | None
+) -> tuple[Array, list[str]]:
     """Return the distinct iterative solutions of a pose from several starts, and their (empty) labels."""
     numbers = description.numbers
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -np.pi)
@@ -240,7 +262,9 @@ def _iterative_solutions(description: Description, T: Array, near: Array | None)
     starts = np.random.default_rng(0).uniform(lower, upper, (ITERATION_STARTS, description.n))
     if near is not None:
         starts[0] = near
-    solutions = solve_numerically(description, np.broadcast_to(T, (ITERATION_STARTS, 4, 4)), starts).q[:, 0]
+    solutions = solve_numerically(
+        description, np.broadcast_to(T, (ITERATION_STARTS, 4, 4)), starts
+    ).q[:, 0]
     different: list[Array] = []
     for q in solutions[np.isfinite(solutions).all(axis=1)]:
         if not any(np.abs(q - other).max() < SAME_SOLUTION for other in different):

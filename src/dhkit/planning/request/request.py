@@ -32,7 +32,9 @@ class PlanRequest:
 
     def rests_at(self, name: str) -> bool:
         """Whether the arm is at rest at a place, given by its name."""
-        return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(name, np.ones(1)).any()
+        return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(
+            name, np.ones(1)
+        ).any()
 
 
 def require_limits(limits: object) -> None:
@@ -44,7 +46,9 @@ def require_limits(limits: object) -> None:
         Something else.
     """
     if limits is not None and not isinstance(limits, Limits):
-        raise TypeError(f"limits is {limits!r}; expected Limits.of(description, velocity=...) and the like")
+        raise TypeError(
+            f"limits is {limits!r}; expected Limits.of(description, velocity=...) and the like"
+        )
 
 
 def checked_limits(description: Description, limits: Limits | None) -> Limits:
@@ -61,7 +65,9 @@ def checked_limits(description: Description, limits: Limits | None) -> Limits:
     if limits is None:
         return Limits.of(description)
     if len(limits.lower) != description.n:
-        raise ValueError(f"limits are of {len(limits.lower)} joints; {description.name} has {description.n}")
+        raise ValueError(
+            f"limits are of {len(limits.lower)} joints; {description.name} has {description.n}"
+        )
     return limits
 
 

@@ -19,7 +19,14 @@ from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.criteria import Limit
 from dhkit.planning.obstacles import Gaps, Separation
-from dhkit.planning.program import Knots, Margins, MotionProgram, SearchLimitError, Task, knots_along
+from dhkit.planning.program import (
+    Knots,
+    Margins,
+    MotionProgram,
+    SearchLimitError,
+    Task,
+    knots_along,
+)
 from dhkit.planning.search.sampling import PathSampler
 from dhkit.planning.search.search import Excess, MotionSearch, PlannedMotion
 from dhkit.trajectories import Trajectory
@@ -114,7 +121,11 @@ class AvoidingSearch:
     """
 
     def __init__(
-        self, task: Task, search: MotionSearch[Knots], program: MotionProgram, finer: Callable[[], MotionProgram]
+        self,
+        task: Task,
+        search: MotionSearch[Knots],
+        program: MotionProgram,
+        finer: Callable[[], MotionProgram],
     ) -> None:
         avoidance = task.avoidance
         self.task = task
@@ -164,11 +175,15 @@ class AvoidingSearch:
 
     def _slowed_path(self) -> PlannedMotion | None:
         """Return the shortest sampled path, followed from rest to rest between its corners; None if there is none."""
-        paths = sorted((path for path in self._paths.values() if path is not None), key=self._length)
+        paths = sorted(
+            (path for path in self._paths.values() if path is not None), key=self._length
+        )
         for path in paths:
             corners = np.vstack([path[0][:1], *(leg[1:] for leg in path)])
             task = replace(self.task, points=corners)
-            failure = self.search.failure or PlanningError(f"no motion found within {self.search.work.limit_text}")
+            failure = self.search.failure or PlanningError(
+                f"no motion found within {self.search.work.limit_text}"
+            )
             slow = PlannedMotion.slowed_straight(task, self.program.mesh.intervals, failure)
             if slow is not None:
                 return slow
@@ -223,8 +238,12 @@ class AvoidingSearch:
         # The box from which samples are taken: the joint ranges; without a limit, one turn or the arm's reach beyond
         # the given configurations.
         span = np.where(arm.prismatic, max(task.arm.reach, 1e-3), np.pi)
-        lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(task.points.min(axis=0), 0) - span)
-        upper = np.where(np.isfinite(limits.upper), limits.upper, np.maximum(task.points.max(axis=0), 0) + span)
+        lower = np.where(
+            np.isfinite(limits.lower), limits.lower, np.minimum(task.points.min(axis=0), 0) - span
+        )
+        upper = np.where(
+            np.isfinite(limits.upper), limits.upper, np.maximum(task.points.max(axis=0), 0) + span
+        )
 
         # The gap that each pair keeps: the clearance and a little more, or the gap that it has at the ends if that is
         # less.
@@ -236,12 +255,16 @@ class AvoidingSearch:
         largest = float(need.max(initial=0.0))
 
         def is_free(q: Array) -> NDArray[np.bool_]:
-            free: NDArray[np.bool_] = np.all(self.separation.gaps(q[:, None], largest).gap >= need, axis=1)
+            free: NDArray[np.bool_] = np.all(
+                self.separation.gaps(q[:, None], largest).gap >= need, axis=1
+            )
             free[free] = task.avoidance.keeps_shapes_apart(task.arm, q[free])
             return free
 
         samples = min(FIRST_SAMPLES * 2**turn, MAX_SAMPLES)
-        sampler = PathSampler(is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples)
+        sampler = PathSampler(
+            is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples
+        )
         path = []
         for start, goal in zip(task.points[:-1], task.points[1:], strict=True):
             leg = sampler.path(start, goal)
@@ -263,7 +286,9 @@ class AvoidingSearch:
 
         # States (1 - s) path + s motion on the line between two points, for s in ``share``.
         between = of_path + share[:, None, None] * (of_motion - of_path)
-        return bool(self.separation.smallest(between.reshape(-1, self.task.arm.n), 0.0).min() >= 0.0)
+        return bool(
+            self.separation.smallest(between.reshape(-1, self.task.arm.n), 0.0).min() >= 0.0
+        )
 
     def _length(self, path: list[Array]) -> float:
         """Return the time that a path takes at the speed limits, s."""
@@ -345,7 +370,10 @@ class AvoidingSearch:
                     # It is clear: planes beside it allow the next motion to be better.
                     saved = np.inf if best is None else best.cost - found.cost
                     best = found if saved > 0 else best
-                    if saved < MIN_IMPROVEMENT * found.cost or found.cost - EXPECTED_ROUNDS * saved > best_cost:
+                    if (
+                        saved < MIN_IMPROVEMENT * found.cost
+                        or found.cost - EXPECTED_ROUNDS * saved > best_cost
+                    ):
                         break
                     gaps, required = self._measured(found.trajectory, knots, np.inf)
                     planes = Planes.of(self._with_planes_of_ends(gaps), required, planes.inflation)
@@ -412,7 +440,9 @@ class AvoidingSearch:
         avoidance = self.task.avoidance
         pairs = self.separation.pairs
         required = avoidance.required(self.task.arm, inside.reshape(-1, self.task.arm.n), pairs)
-        return self.separation.gaps(inside, near), required.reshape(*inside.shape[:2], -1).max(axis=1)
+        return self.separation.gaps(inside, near), required.reshape(*inside.shape[:2], -1).max(
+            axis=1
+        )
 
     def _inside(self, motion: Trajectory, knots: Knots, points: int) -> Array:
         """Return states of a motion in each interval of the mesh, both ends included, shape (K, points, n)."""

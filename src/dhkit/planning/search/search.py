@@ -89,19 +89,25 @@ class PlannedMotion:
         certificate = task.checker.check(trajectory)
         if not certificate.ok:
             worst = max(certificate.checks, key=lambda check: check.excess)
-            raise PlanningError(f"{worst.what} is exceeded by {100 * worst.excess:.2g} % at {worst.time:.3g} s")
+            raise PlanningError(
+                f"{worst.what} is exceeded by {100 * worst.excess:.2g} % at {worst.time:.3g} s"
+            )
         cost = cost_of(task.objective, trajectory, task.loaded, task.friction)
         return cls(trajectory, certificate, cost, 1, is_resolved=False)
 
     @classmethod
-    def slowed_straight(cls, task: Task, intervals: int, failure: PlanningError) -> PlannedMotion | None:
+    def slowed_straight(
+        cls, task: Task, intervals: int, failure: PlanningError
+    ) -> PlannedMotion | None:
         """Return cubics between the task's points, slowed down until they keep all limits; None if they cannot.
 
         For tasks in which the optimizer finds nothing; ``failure`` is its error.
         """
         if not task.rests or task.duration is not None:
             return None
-        durations = np.maximum(leg_durations(task.loaded, task.limits, task.points), SHORTEST_DURATION)
+        durations = np.maximum(
+            leg_durations(task.loaded, task.limits, task.points), SHORTEST_DURATION
+        )
         straight = straight_motion(task, durations)
         c = task.checker.slow_down(task.checker.states(straight))
         if not np.isfinite(c):
@@ -111,7 +117,9 @@ class PlannedMotion:
         if not certificate.ok:
             return None
         cost = cost_of(task.objective, trajectory, task.loaded, task.friction)
-        return cls(trajectory, certificate, cost, intervals, is_converged=False, failure=str(failure))
+        return cls(
+            trajectory, certificate, cost, intervals, is_converged=False, failure=str(failure)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +161,9 @@ class MotionSearch(Generic[Iterate]):
     """Number of solutions of this search."""
     _last: Solution = field(init=False)
 
-    def __call__(self, warm: Trajectory | None = None, starts: Starts[Iterate] | None = None) -> PlannedMotion:
+    def __call__(
+        self, warm: Trajectory | None = None, starts: Starts[Iterate] | None = None
+    ) -> PlannedMotion:
         """Return the best certified motion.
 
         Raises
@@ -208,12 +218,17 @@ class MotionSearch(Generic[Iterate]):
         margins = Margins(self.program.intervals)
         try:
             for turn in range(self._rounds):
-                checked = self.checked(found, turn, is_last=self.is_last and turn == self._rounds - 1)
+                checked = self.checked(
+                    found, turn, is_last=self.is_last and turn == self._rounds - 1
+                )
                 if isinstance(checked, PlannedMotion):
                     return checked
                 before = self.program
                 margins = self.widen_margins(margins, found, checked, turn)
-                if self.program is before and (again := self._solved_again(guess, margins)) is not None:
+                if (
+                    self.program is before
+                    and (again := self._solved_again(guess, margins)) is not None
+                ):
                     found = again
                     continue
                 guess = self.program.next_guess(guess, found)
@@ -235,7 +250,9 @@ class MotionSearch(Generic[Iterate]):
     def _rounds(self) -> int:
         return MAX_ROUNDS if self.is_last else FIRST_ROUNDS
 
-    def checked(self, found: Iterate, turn: int, *, is_last: bool = False) -> PlannedMotion | Excess:
+    def checked(
+        self, found: Iterate, turn: int, *, is_last: bool = False
+    ) -> PlannedMotion | Excess:
         """Return a solution as a certified motion, or its excess; in later turns it may be slowed down further."""
         task = self.task
         program = self.program
@@ -322,16 +339,29 @@ class MotionSearch(Generic[Iterate]):
         self.tried += 1
         self.work.solves += 1
         solution = program.solver(
-            given.x, given.parameters, given.bounds, rows, self.work, self.progress, given.scaling, warm
+            given.x,
+            given.parameters,
+            given.bounds,
+            rows,
+            self.work,
+            self.progress,
+            given.scaling,
+            warm,
         )
         # A feasible motion that is not optimal is better than none: friction and absolute powers have kinks.
-        is_usable = solution.converged or (self.is_last and solution.infeasibility <= UNCONVERGED_TOLERANCE)
+        is_usable = solution.converged or (
+            self.is_last and solution.infeasibility <= UNCONVERGED_TOLERANCE
+        )
         if is_usable and solution.infeasibility <= FEASIBILITY_TOLERANCE:
             self._last = solution
             return program.iterate(solution.x)
         worst = worst_row(solution, program.blocks, rows)
         name = self._row_name(worst.rows.what, worst.place, of_joint=worst.rows.of_joints)
-        state = f"misses its bound by {worst.violation:.2g}" if np.isfinite(worst.violation) else "is not a number"
+        state = (
+            f"misses its bound by {worst.violation:.2g}"
+            if np.isfinite(worst.violation)
+            else "is not a number"
+        )
         raise PlanningError(
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
             f"{name} {state} at {program.place(worst.interval)}"

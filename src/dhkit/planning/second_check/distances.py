@@ -93,7 +93,8 @@ class DrawnArm:
         self._data = self._model.createData()
         self._frame_ids = [self._model.getFrameId(f"dh{i}") for i in range(description.n + 1)]
         self._solids = [
-            Solid(self._shape(part.geometry, part), part.link, part.T_link_part) for part in link_parts(description)
+            Solid(self._shape(part.geometry, part), part.link, part.T_link_part)
+            for part in link_parts(description)
         ]
         self.motion = motion
         self.instants = dense(motion, FIRST_TURN)
@@ -111,7 +112,11 @@ class DrawnArm:
 
     def smallest(self, claim: Claim) -> tuple[float, Array]:
         """Return the smallest distance of the solids of a claim, m, and its instant, shape (2,)."""
-        found = [self._smallest_of(pair, claim) for pair in self._pairs(claim) if not self._is_fixed(pair, claim)]
+        found = [
+            self._smallest_of(pair, claim)
+            for pair in self._pairs(claim)
+            if not self._is_fixed(pair, claim)
+        ]
         return min(found, key=lambda one: one[0], default=(np.inf, self.instants[0]))
 
     def _is_fixed(self, pair: tuple[Solid, Solid], claim: Claim) -> bool:
@@ -134,7 +139,9 @@ class DrawnArm:
             below = self._coal.Halfspace(np.array([0.0, 0.0, 1.0]), claim.other.height)
             others = [Solid(below, None, np.eye(4), claim.other.height)]
         else:
-            others = [Solid(self._shape(claim.other.geometry), None, np.array(claim.other.placement))]
+            others = [
+                Solid(self._shape(claim.other.geometry), None, np.array(claim.other.placement))
+            ]
         return product(own, others)
 
     def _smallest_of(self, pair: tuple[Solid, Solid], claim: Claim) -> tuple[float, Array]:
@@ -183,7 +190,9 @@ class DrawnArm:
         one = coal.Transform3s(np.array(T_first[:3, :3]), np.array(T_first[:3, 3]))
         for shift in (np.zeros(3), SHIFT, -SHIFT):
             other = coal.Transform3s(np.array(T_second[:3, :3]), T_second[:3, 3] + shift)
-            found = float(coal.distance(first, one, second, other, self._request, coal.DistanceResult()))
+            found = float(
+                coal.distance(first, one, second, other, self._request, coal.DistanceResult())
+            )
             if found > FAILED:
                 return found
         return -MEASURED  # inside each other, to a depth that is not known
@@ -236,5 +245,7 @@ def _random_configurations(description: Description) -> Array:
     bound = np.where(prismatic, description.reach or 1.0, np.pi)
     lower = np.where(prismatic & np.isfinite(numbers.lower), numbers.lower, -bound)
     upper = np.where(prismatic & np.isfinite(numbers.upper), numbers.upper, bound)
-    random: Array = np.random.default_rng(1).uniform(lower, np.maximum(lower, upper), (RANDOM_STATES, description.n))
+    random: Array = np.random.default_rng(1).uniform(
+        lower, np.maximum(lower, upper), (RANDOM_STATES, description.n)
+    )
     return random

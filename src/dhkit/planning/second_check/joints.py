@@ -36,7 +36,12 @@ def jumps(motion: Trajectory) -> Iterator[Refutation]:
         jump = np.abs(after - before)
         size = max(1.0, float(np.abs(before).max(initial=0.0)))
         for k, i in np.argwhere(jump > ACCEPTED * size):
-            yield Refutation(f"jump of {name} of joint {i + 1}", float(jump[k, i]), 0.0, float(motion.breaks[k + 1]))
+            yield Refutation(
+                f"jump of {name} of joint {i + 1}",
+                float(jump[k, i]),
+                0.0,
+                float(motion.breaks[k + 1]),
+            )
 
 
 def exceeded_limits(
@@ -129,13 +134,19 @@ def _torques(
         qd = derivative(motion, at, 1)
         qdd = derivative(motion, at, 2)
         tau = np.array([pin.rnea(model, data, *state) for state in zip(q, qd, qdd, strict=True)])
-        tau += qdd @ numbers.coupling  # of drives that two joints turn; Pinocchio has no place for it
+        tau += (
+            qdd @ numbers.coupling
+        )  # of drives that two joints turn; Pinocchio has no place for it
         if friction is not None:
             # s goes from -1 to 1 with the direction of motion; dry friction is c+ at s = 1 and c- at s = -1:
             #   viscous qd + (c+ - c-) / 2 s + (c+ + c-) / 2 s^2.
             s = np.sign(qd) if friction.width == 0 else qd / np.hypot(qd, friction.width)
             forwards, backwards = numbers.coulomb.T
-            tau += numbers.viscous * qd + (forwards - backwards) / 2 * s + (forwards + backwards) / 2 * s**2
+            tau += (
+                numbers.viscous * qd
+                + (forwards - backwards) / 2 * s
+                + (forwards + backwards) / 2 * s**2
+            )
         return tau
 
     return torques

@@ -47,7 +47,10 @@ def recheck(
         Pinocchio is not installed, or a mesh cannot be read.
     """
     instants = dense(motion, TURN)
-    refutations = [*jumps(motion), *exceeded_limits(description, motion, instants, limits, payload, friction)]
+    refutations = [
+        *jumps(motion),
+        *exceeded_limits(description, motion, instants, limits, payload, friction),
+    ]
     smallest = np.inf
     if claims:
         drawn = DrawnArm(description, motion)
@@ -55,5 +58,7 @@ def recheck(
             gap, instant = drawn.smallest(claim)
             smallest = min(smallest, gap)
             if gap < claim.refuting:
-                refutations.append(Refutation(str(claim), gap, claim.kept, time_of(motion, instant)))
+                refutations.append(
+                    Refutation(str(claim), gap, claim.kept, time_of(motion, instant))
+                )
     return Recheck(len(instants), smallest, tuple(refutations))

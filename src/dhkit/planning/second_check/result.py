@@ -66,5 +66,9 @@ class Recheck:
         return not self.refutations
 
     def __repr__(self) -> str:
-        found = "nothing refuted" if self.ok else f"{len(self.refutations)} refuted, first {self.refutations[0].what}"
+        found = (
+            "nothing refuted"
+            if self.ok
+            else f"{len(self.refutations)} refuted, first {self.refutations[0].what}"
+        )
         return repr_line("Recheck", f"{self.states} states", found)

@@ -8,14 +8,21 @@ from typing import TYPE_CHECKING
 
 from dhkit.description import Convention, Description, Robot, description_of
 from dhkit.display import repr_line
-from dhkit.symbolic.differentiable.composite_bodies import composite_coriolis_matrix, composite_mass_matrix
+from dhkit.symbolic.differentiable.composite_bodies import (
+    composite_coriolis_matrix,
+    composite_mass_matrix,
+)
 from dhkit.symbolic.differentiable.energies import kinetic_energy, lagrange_torque, potential_energy
 from dhkit.symbolic.differentiable.forward_dynamics import solve_for_acceleration
 from dhkit.symbolic.differentiable.frames import SymbolicTable, jacobian, joint_symbols
 from dhkit.symbolic.differentiable.friction import Friction, friction_parameters, friction_torque
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
 from dhkit.symbolic.differentiable.moments import Moments
-from dhkit.symbolic.differentiable.recursive import recursive_bias, recursive_gravity, recursive_inverse_dynamics
+from dhkit.symbolic.differentiable.recursive import (
+    recursive_bias,
+    recursive_gravity,
+    recursive_inverse_dynamics,
+)
 from dhkit.symbolic.differentiable.vectors import Vector3, dot, plus
 
 if TYPE_CHECKING:
@@ -102,7 +109,9 @@ class CasadiFunctions:
     @cached_property
     def mass_matrix(self) -> casadi.Function:
         """The mass matrix, q -> M, n x n, drives included."""
-        return self._dynamics("mass_matrix", {"q": self._q}, {"M": composite_mass_matrix(self._table, self._q)})
+        return self._dynamics(
+            "mass_matrix", {"q": self._q}, {"M": composite_mass_matrix(self._table, self._q)}
+        )
 
     @cached_property
     def coriolis_matrix(self) -> casadi.Function:
@@ -113,7 +122,9 @@ class CasadiFunctions:
     @cached_property
     def gravity_torque(self) -> casadi.Function:
         """The torques that hold the arm at rest, q -> g, n x 1, N m and N."""
-        return self._dynamics("gravity_torque", {"q": self._q}, {"g": recursive_gravity(self._table, self._q)})
+        return self._dynamics(
+            "gravity_torque", {"q": self._q}, {"g": recursive_gravity(self._table, self._q)}
+        )
 
     @cached_property
     def bias(self) -> casadi.Function:
@@ -146,13 +157,17 @@ class CasadiFunctions:
     @cached_property
     def potential_energy(self) -> casadi.Function:
         """Potential energy, q -> V, J, 0 for a mass at the world's origin."""
-        return self._dynamics("potential_energy", {"q": self._q}, {"V": potential_energy(self._table, self._q)})
+        return self._dynamics(
+            "potential_energy", {"q": self._q}, {"V": potential_energy(self._table, self._q)}
+        )
 
     @cached_property
     def lagrange(self) -> casadi.Function:
         """Lagrange's equations, q, qd, qdd -> tau = d/dt dL/dqd - dL/dq, n x 1, by differentiating L = K - V."""
         tau = lagrange_torque(self._table, self._q, self._qd, self._qdd)
-        return self._dynamics("lagrange", {"q": self._q, "qd": self._qd, "qdd": self._qdd}, {"tau": tau})
+        return self._dynamics(
+            "lagrange", {"q": self._q, "qd": self._qd, "qdd": self._qdd}, {"tau": tau}
+        )
 
     # Symbols and tables
 
@@ -170,7 +185,11 @@ class CasadiFunctions:
 
     @cached_property
     def _load_symbols(self) -> dict[str, casadi.SX]:
-        return {name: joint_symbols(name, size) for name, size in _PAYLOAD.items()} if self._payload else {}
+        return (
+            {name: joint_symbols(name, size) for name, size in _PAYLOAD.items()}
+            if self._payload
+            else {}
+        )
 
     @cached_property
     def _wrench_input(self) -> dict[str, casadi.SX]:
@@ -218,7 +237,9 @@ class CasadiFunctions:
 
     # Value semantics
 
-    def __reduce__(self) -> tuple[type[CasadiFunctions], tuple[Description, Friction | None, bool, bool]]:
+    def __reduce__(
+        self,
+    ) -> tuple[type[CasadiFunctions], tuple[Description, Friction | None, bool, bool]]:
         return CasadiFunctions, (self._description, self._friction, self._payload, self._wrench)
 
     def __repr__(self) -> str:
@@ -230,16 +251,22 @@ class CasadiFunctions:
         return repr_line("CasADi functions", self._description.name, ", ".join(layers))
 
 
-def _function(name: str, inputs: Mapping[str, casadi.SX], outputs: Mapping[str, casadi.SX]) -> casadi.Function:
+def _function(
+    name: str, inputs: Mapping[str, casadi.SX], outputs: Mapping[str, casadi.SX]
+) -> casadi.Function:
     """Return a function with named inputs and outputs."""
     import casadi
 
     # With "cse" CasADi computes equal products once.
     expressions = [casadi.densify(casadi.SX(x)) for x in outputs.values()]
-    return casadi.Function(name, list(inputs.values()), expressions, list(inputs), list(outputs), {"cse": True})
+    return casadi.Function(
+        name, list(inputs.values()), expressions, list(inputs), list(outputs), {"cse": True}
+    )
 
 
-def _payload_moments(description: Description, mass: casadi.SX, com: casadi.SX, inertia: casadi.SX) -> Moments:
+def _payload_moments(
+    description: Description, mass: casadi.SX, com: casadi.SX, inertia: casadi.SX
+) -> Moments:
     """Return the moments of a load in the joint frame of an arm's last link.
 
     Parameters

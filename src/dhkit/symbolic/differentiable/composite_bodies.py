@@ -6,10 +6,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
-from dhkit.symbolic.differentiable.equation_frames import EquationFrame, equation_frames, link_velocities
+from dhkit.symbolic.differentiable.equation_frames import (
+    EquationFrame,
+    equation_frames,
+    link_velocities,
+)
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
 from dhkit.symbolic.differentiable.moments import Moments
-from dhkit.symbolic.differentiable.vectors import ZERO_VECTOR, Scalar, Vector3, cross, dot, plus, times
+from dhkit.symbolic.differentiable.vectors import (
+    ZERO_VECTOR,
+    Scalar,
+    Vector3,
+    cross,
+    dot,
+    plus,
+    times,
+)
 
 if TYPE_CHECKING:
     import casadi
@@ -123,7 +135,11 @@ def _composites(frames: list[EquationFrame]) -> Iterator[tuple[int, Moments]]:
         frame = frames[j]
         composite = composite.joined(frame.moments)
         yield j, composite
-        composite = composite.about_z(*frame.rotation).about_x(frame.cos_alpha, frame.sin_alpha).moved(frame.lever)
+        composite = (
+            composite.about_z(*frame.rotation)
+            .about_x(frame.cos_alpha, frame.sin_alpha)
+            .moved(frame.lever)
+        )
 
 
 def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> _Wrench:
@@ -137,7 +153,9 @@ def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> _Wrench:
     return (-y, x, 0.0), (-body.xz, -body.yz, body.xx + body.yy)
 
 
-def _column_rate(frame: EquationFrame, body: Moments, rates: _VelocityMoments, w: Vector3, v: Vector3) -> _Wrench:
+def _column_rate(
+    frame: EquationFrame, body: Moments, rates: _VelocityMoments, w: Vector3, v: Vector3
+) -> _Wrench:
     """Return the integrals of dJ_j/dt and of r x dJ_j/dt over the mass that joint j carries.
 
     The joint's link turns with w, rad/s, and its origin moves with v, m/s.
@@ -161,7 +179,9 @@ def _column_rate(frame: EquationFrame, body: Moments, rates: _VelocityMoments, w
     return force, plus(moment, _inertia_times(body, z_dot))
 
 
-def _row_rate(frame: EquationFrame, wrench: _Wrench, couple: Vector3, w: Vector3, v: Vector3) -> Scalar:
+def _row_rate(
+    frame: EquationFrame, wrench: _Wrench, couple: Vector3, w: Vector3, v: Vector3
+) -> Scalar:
     """Return the integral of J_j . dJ_i/dt over the mass that a later joint j carries.
 
     Parameters
@@ -193,7 +213,9 @@ def _inertia_times(body: Moments, w: Vector3) -> Vector3:
     )
 
 
-def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: _Wrench) -> Iterator[tuple[int, _Wrench]]:
+def _wrench_at_each_joint(
+    frames: list[EquationFrame], j: int, wrench: _Wrench
+) -> Iterator[tuple[int, _Wrench]]:
     """Yield joint j's wrench about the origin and in the equation axes of every joint from j down to the first."""
     force, moment = wrench
     for i in reversed(range(j + 1)):
@@ -203,7 +225,9 @@ def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: _Wrench) 
         moment = plus(moment, cross(frames[i].lever, force))
 
 
-def _couple_at_each_joint(frames: list[EquationFrame], j: int, couple: Vector3) -> Iterator[tuple[int, Vector3]]:
+def _couple_at_each_joint(
+    frames: list[EquationFrame], j: int, couple: Vector3
+) -> Iterator[tuple[int, Vector3]]:
     """Yield a free vector of joint j's equation axes in those of every joint from j down to the first."""
     for i in reversed(range(j + 1)):
         yield i, couple

@@ -35,7 +35,13 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
         # v . (w x m c)
         mixed = dot(v, cross(w, link.first))
 
-        twice_K += link.mass * dot(v, v) + squares - 2 * products + 2 * mixed + table.armature[i] * (qd[i] * qd[i])
+        twice_K += (
+            link.mass * dot(v, v)
+            + squares
+            - 2 * products
+            + 2 * mixed
+            + table.armature[i] * (qd[i] * qd[i])
+        )
     for i, j, inertia in table.couplings:
         twice_K += 2 * inertia * (qd[i] * qd[j])
     return casadi.SX(twice_K / 2)
@@ -85,7 +91,9 @@ def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
     return casadi.gradient(potential_energy(table, q), q)
 
 
-def lagrange_inverse_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
+def lagrange_inverse_dynamics(
+    table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX
+) -> casadi.SX:
     """Return tau = M qdd + C qd + g, n x 1, N m and N, from the matrices."""
     M = lagrange_mass_matrix(table, q)
     C = lagrange_coriolis_matrix(table, q, qd)

@@ -64,7 +64,9 @@ def equation_frames(table: InertialTable, q: casadi.SX) -> list[EquationFrame]:
     no_rotation = (1.0, 0.0)
     frames: list[EquationFrame] = []
     angle = _ZERO_ANGLE
-    link_rotation = no_rotation  # cosine and sine from the axes of link i-1's equations to the link itself
+    link_rotation = (
+        no_rotation  # cosine and sine from the axes of link i-1's equations to the link itself
+    )
     for i, (row, link) in enumerate(zip(table.rows, table.links, strict=True)):
         # The translation of Rx(alpha) Tx(a) Tz(d), in the axes of link i-1's equations.
         d = row.d + q[i] if row.prismatic else row.d
@@ -82,7 +84,11 @@ def equation_frames(table: InertialTable, q: casadi.SX) -> list[EquationFrame]:
             moments = link
             link_rotation = no_rotation
             angle = _ZERO_ANGLE
-        frames.append(EquationFrame(row.prismatic, row.cos_alpha, row.sin_alpha, lever, equation_rotation, moments))
+        frames.append(
+            EquationFrame(
+                row.prismatic, row.cos_alpha, row.sin_alpha, lever, equation_rotation, moments
+            )
+        )
     return frames
 
 

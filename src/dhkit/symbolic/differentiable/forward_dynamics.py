@@ -59,6 +59,10 @@ def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
     return casadi.vertcat(*x) + zero_or_nan
 
 
-def recursive_forward_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX) -> casadi.SX:
+def recursive_forward_dynamics(
+    table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX
+) -> casadi.SX:
     """Return the joint accelerations qdd of M qdd = tau - C qd - g, n x 1, rad/s^2 and m/s^2."""
-    return solve_for_acceleration(composite_mass_matrix(table, q), tau - recursive_bias(table, q, qd))
+    return solve_for_acceleration(
+        composite_mass_matrix(table, q), tau - recursive_bias(table, q, qd)
+    )

@@ -126,9 +126,18 @@ def joint_symbols(name: str, n: int) -> casadi.SX:
 def _table_numbers(description: Description) -> Array:
     """Return the numbers of an arm's frames, shape (6 n + 24,): six a joint, twelve each of base and tool."""
     numbers = description.numbers
-    columns = (numbers.a, numbers.d, numbers.cos_alpha, numbers.sin_alpha, numbers.cos_theta, numbers.sin_theta)
+    columns = (
+        numbers.a,
+        numbers.d,
+        numbers.cos_alpha,
+        numbers.sin_alpha,
+        numbers.cos_theta,
+        numbers.sin_theta,
+    )
     joints = np.stack(columns, axis=1).ravel()
-    return np.concatenate([joints, numbers.T_world_base[:3].ravel(), numbers.T_last_tool[:3].ravel()])
+    return np.concatenate(
+        [joints, numbers.T_world_base[:3].ravel(), numbers.T_last_tool[:3].ravel()]
+    )
 
 
 @takes_robot
@@ -138,7 +147,9 @@ def table_pattern(description: Description) -> tuple[str, Array]:
     Arms of equal pattern (convention, kinds of joints, places of the numbers 0, 1 and -1) have equal expressions.
     """
     pattern = _pattern(description)
-    return f"{description.convention.value} {description.kinds} {pattern.code}", pattern.parameters[0]
+    return f"{description.convention.value} {description.kinds} {pattern.code}", pattern.parameters[
+        0
+    ]
 
 
 def _pattern(description: Description) -> NumberPattern:
@@ -171,7 +182,9 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
     return casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
 
 
-def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:
+def jacobian_dot(
+    table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: ReferenceAxes = "world"
+) -> casadi.SX:
     """Return the time derivative of the Jacobian along qd, 6 x n, m and rad per s and unit of q.
 
     For ``"tool"``, the derivative of its components in the axes of the tool.

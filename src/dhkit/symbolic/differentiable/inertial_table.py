@@ -127,7 +127,9 @@ def inertial_pattern(*descriptions: Description) -> tuple[str, Array]:
     """
     pattern = _pattern(descriptions)
     values = pattern.parameters
-    return f"{descriptions[0].kinds} {pattern.code}", values[0] if len(descriptions) == 1 else values
+    return f"{descriptions[0].kinds} {pattern.code}", values[0] if len(
+        descriptions
+    ) == 1 else values
 
 
 def _pattern(descriptions: Sequence[Description]) -> NumberPattern:
@@ -164,7 +166,9 @@ def _numbers(description: Description) -> Array:
     for link in links:
         moments += [float(entry) for entry in link.entries]
     coupling = numbers.coupling[np.triu_indices(description.n, 1)]
-    return np.array([*joints, *moments, *numbers.armature, *gravity, energy, *coupling], dtype=float)
+    return np.array(
+        [*joints, *moments, *numbers.armature, *gravity, energy, *coupling], dtype=float
+    )
 
 
 def exact_moments(description: Description) -> list[Moments]:
@@ -183,7 +187,10 @@ def exact_moments(description: Description) -> list[Moments]:
             s = Fraction(float(numbers.sin_alpha[i]))
             com = plus((a, 0, 0), about_x(c, s, com))
             rows = [about_x(c, s, row) for row in inertia]
-            inertia = [about_x(c, s, (column[0], column[1], column[2])) for column in zip(*rows, strict=True)]
+            inertia = [
+                about_x(c, s, (column[0], column[1], column[2]))
+                for column in zip(*rows, strict=True)
+            ]
         moments.append(Moments.of_body(mass, com, inertia))
     return moments
 

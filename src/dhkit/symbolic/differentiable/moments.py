@@ -48,7 +48,10 @@ class Moments:
         S = []
         half_trace = (inertia[0][0] + inertia[1][1] + inertia[2][2]) / 2
         for i in range(3):
-            row = [(half_trace if i == j else 0) - inertia[i][j] + mass * com[i] * com[j] for j in range(3)]
+            row = [
+                (half_trace if i == j else 0) - inertia[i][j] + mass * com[i] * com[j]
+                for j in range(3)
+            ]
             S.append(row)
         return cls.of_tensor(mass, times(mass, com), S)
 
@@ -83,7 +86,16 @@ class Moments:
     @property
     def entries(self) -> tuple[Scalar, ...]:
         """All ten numbers, in the order of the fields."""
-        return (self.mass, *self.first, self.difference, self.yy, self.zz, self.xy, self.xz, self.yz)
+        return (
+            self.mass,
+            *self.first,
+            self.difference,
+            self.yy,
+            self.zz,
+            self.xy,
+            self.xz,
+            self.yz,
+        )
 
     @classmethod
     def of_entries(cls, entries: Sequence[Scalar]) -> Moments:
@@ -141,7 +153,9 @@ class Moments:
 
     def __repr__(self) -> str:
         is_numeric = all(isinstance(entry, int | float | Fraction) for entry in self.entries)
-        return repr_line("Moments", summary=f"mass {float(self.mass):.4g} kg" if is_numeric else "of symbols")
+        return repr_line(
+            "Moments", summary=f"mass {float(self.mass):.4g} kg" if is_numeric else "of symbols"
+        )
 
 
 def regroup(links: Iterable[Moments], rows: Sequence[JointRow]) -> tuple[Moments, list[Moments]]:

@@ -46,7 +46,9 @@ class NumberPattern:
     @property
     def code(self) -> str:
         """One letter a number: 0, + and - for 0, 1 and -1, p for a symbol."""
-        letters = np.select([self.numbers[0] == constant for constant in CONSTANTS], list("0+-"), "p")
+        letters = np.select(
+            [self.numbers[0] == constant for constant in CONSTANTS], list("0+-"), "p"
+        )
         return "".join(np.where(self.is_symbol, "p", letters))
 
     @property

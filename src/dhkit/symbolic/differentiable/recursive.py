@@ -76,7 +76,9 @@ class _AngularMotion:
 
     def in_link_axes(self, frame: EquationFrame) -> _AngularMotion:
         """Return the same motion, given in twisted axes, in the axes of the link's equations."""
-        return _AngularMotion(frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column))
+        return _AngularMotion(
+            frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column)
+        )
 
     def moment(self, link: Moments) -> Vector3:
         """Return the integral of r x U r over a link's mass, N m: the moment that its rotation needs."""
@@ -89,12 +91,19 @@ class _AngularMotion:
         return (
             S.yy * U_zy - S.zz * U_yz + S.yz * (U_zz - U_yy) + S.xy * U_zx - S.xz * U_yx,
             S.zz * U_xz - S.xx * U_zx + S.xz * (x * x - z * z) + S.yz * U_xy - S.xy * U_zy,
-            (S.xx + S.yy) * self.wd_z + S.difference * (x * y) + S.xy * (U_yy - U_xx) + S.xz * U_yz - S.yz * U_xz,
+            (S.xx + S.yy) * self.wd_z
+            + S.difference * (x * y)
+            + S.xy * (U_yy - U_xx)
+            + S.xz * U_yz
+            - S.yz * U_xz,
         )
 
 
 def recursive_inverse_dynamics(
-    table: InertialTable, q: casadi.SX, qd: Sequence[Scalar] | casadi.SX, qdd: Sequence[Scalar] | casadi.SX
+    table: InertialTable,
+    q: casadi.SX,
+    qd: Sequence[Scalar] | casadi.SX,
+    qdd: Sequence[Scalar] | casadi.SX,
 ) -> casadi.SX:
     """Return the joint torques of a motion by Newton's and Euler's equations, n x 1, N m and N; drives included.
 

@@ -26,7 +26,12 @@ _UNITS: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0
 
 
 def velocity_regressor(
-    table: SymbolicTable, gravity: Vector3, q: casadi.SX, qd: casadi.SX, qd_r: casadi.SX, qdd_r: casadi.SX
+    table: SymbolicTable,
+    gravity: Vector3,
+    q: casadi.SX,
+    qd: casadi.SX,
+    qd_r: casadi.SX,
+    qdd_r: casadi.SX,
 ) -> casadi.SX:
     """Return Y with Y theta = M(q) qdd_r + C(q, qd) qd_r + g(q), n x 10 n, without the drives' inertia.
 
@@ -78,7 +83,9 @@ class _BilinearMotion:
 
         U = [wd]x + ([w]x [w_r]x + [w_r]x [w]x) / 2.
         """
-        twice_centripetal = plus(cross(self.w, cross(self.w_r, r)), cross(self.w_r, cross(self.w, r)))
+        twice_centripetal = plus(
+            cross(self.w, cross(self.w_r, r)), cross(self.w_r, cross(self.w, r))
+        )
         return plus(cross(self.wd, r), times(0.5, twice_centripetal))
 
     def power(self, v: Vector3, w: Vector3) -> list[Scalar]:
@@ -90,7 +97,10 @@ class _BilinearMotion:
         of_mass = dot(v, self.a)
 
         # m c:     v . U e_k + w . (e_k x a)  for each axis e_k
-        of_first = [dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a)) for unit in _UNITS]
+        of_first = [
+            dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a))
+            for unit in _UNITS
+        ]
 
         # I:       w . I wd + (w x w_i) . I w_r / 2 + (w x w_r) . I w_i / 2,  with w_i the link's own angular velocity
         of_second = []
@@ -177,7 +187,9 @@ class _FrameStep:
         w = self.to_own_axes(column[1])
         return plus(v, cross(w, self.lever)), w
 
-    def next_motion(self, before: _BilinearMotion, qd: Scalar, qd_r: Scalar, qdd_r: Scalar) -> _BilinearMotion:
+    def next_motion(
+        self, before: _BilinearMotion, qd: Scalar, qd_r: Scalar, qdd_r: Scalar
+    ) -> _BilinearMotion:
         """Return this link's motion from the previous link's, the joint's rates qd, qd_r and acceleration qdd_r."""
         z = self.axis
         motion = _BilinearMotion(
@@ -193,7 +205,9 @@ class _FrameStep:
 
         if self.prismatic:
             # a + U lever + 2 qd w x z + qdd z
-            a = plus(plus(motion.a, motion.relative_acceleration(self.lever)), plus(twice_w_z, driven))
+            a = plus(
+                plus(motion.a, motion.relative_acceleration(self.lever)), plus(twice_w_z, driven)
+            )
             return _BilinearMotion(motion.w, motion.w_r, motion.wd, a)
 
         # w + qd z, and wd + qd w x z + qdd z

@@ -2,7 +2,13 @@
 
 from dhkit.symbolic.equations.c_code import equations_c
 from dhkit.symbolic.equations.html import equation_mathml, html_page
-from dhkit.symbolic.equations.latex import constant_latex, displays, equations_latex, latex_lines, latex_text
+from dhkit.symbolic.equations.latex import (
+    constant_latex,
+    displays,
+    equations_latex,
+    latex_lines,
+    latex_text,
+)
 from dhkit.symbolic.equations.latex_document import latex_document
 from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
 from dhkit.symbolic.equations.python_code import equations_python

@@ -83,7 +83,9 @@ def collected(element: Element) -> Sum:
     # Terms by their rates and accelerations, which are written last.
     groups: dict[Powers, list[_Term]] = {}
     for monomial, coefficient in element.terms.items():
-        powers = sorted((order.positions[k], exponent) for k, exponent in enumerate(monomial) if exponent)
+        powers = sorted(
+            (order.positions[k], exponent) for k, exponent in enumerate(monomial) if exponent
+        )
         motion = tuple(power for power in powers if power[0] >= order.motion)
         rest = tuple(powers[: len(powers) - len(motion)])
         groups.setdefault(motion, []).append((rest, coefficient))
@@ -112,7 +114,9 @@ def _motions(order: _Order, groups: Mapping[Powers, list[_Term]]) -> list[Sum]:
 
         # Factors are compared up to a number: m qd1 + 2 m qd2 is written m (qd1 + 2 qd2).
         _, leading = min(groups[powers])
-        factor = frozenset((monomial, coefficient / leading) for monomial, coefficient in groups[powers])
+        factor = frozenset(
+            (monomial, coefficient / leading) for monomial, coefficient in groups[powers]
+        )
         if factor in by_factor:
             k, first_leading = by_factor[factor]
             motions[k] += (Product(leading / first_leading, powers),)
@@ -197,7 +201,9 @@ def _factored(order: _Order, terms: Sequence[_Term], motion: Sum = ()) -> Produc
     common = dict(terms[0][0])
     for powers, _ in terms[1:]:
         own = dict(powers)
-        common = {position: min(e, own[position]) for position, e in common.items() if position in own}
+        common = {
+            position: min(e, own[position]) for position, e in common.items() if position in own
+        }
     size = _content([abs(coefficient) for _, coefficient in terms])
     rest = [(_divided(powers, common), coefficient / size) for powers, coefficient in terms]
     front = tuple(sorted(common.items()))

@@ -6,7 +6,9 @@ import re
 from html import escape
 
 _EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
-_MATRIX = re.compile(r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL)
+_MATRIX = re.compile(
+    r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL
+)
 _STYLE = """
 body { font: 16px/1.5 "Source Sans 3", "Noto Sans", "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
        max-width: 66rem; margin: 2.5rem auto; padding: 0 1.5rem; }
@@ -37,7 +39,8 @@ def equation_mathml(latex: str) -> str:
     display = _EQUATION.fullmatch(latex)
     converted: str = convert(display[1] if display else latex, display="block")
     return _MATRIX.sub(
-        r'<mo class="bracket">\1</mo><mtable class="matrix">\2</mtable><mo class="bracket">\3</mo>', converted
+        r'<mo class="bracket">\1</mo><mtable class="matrix">\2</mtable><mo class="bracket">\3</mo>',
+        converted,
     )
 
 

@@ -100,7 +100,9 @@ class _Drawing:
                 (x1, y1), (x2, y2) = places
                 dash = ' stroke-dasharray="5 4"' if text == "dashed" else ""
                 width = 1.2 if text == "dashed" else 3
-                parts.append(f'<path d="M{x1} {y1}L{x2} {y2}" stroke="{colour}" stroke-width="{width}"{dash}/>')
+                parts.append(
+                    f'<path d="M{x1} {y1}L{x2} {y2}" stroke="{colour}" stroke-width="{width}"{dash}/>'
+                )
             elif kind == "circle":
                 x, y = places[0]
                 radius = round(float(points[1][0]) * scale, 1)
@@ -126,10 +128,14 @@ def figure_of(derivation: InverseDerivation, step: DerivationStep, T: Array) -> 
     if not found:
         return ""
     draw = {View.TOP: _top, View.TRIANGLE: _triangle, View.SLIDE: _slide}[step.figure.view]
-    return draw(derivation, step, step.form, found[0]).svg(f"{step.title}: {', '.join(step.figure.labels)}")
+    return draw(derivation, step, step.form, found[0]).svg(
+        f"{step.title}: {', '.join(step.figure.labels)}"
+    )
 
 
-def _named_roots(step: DerivationStep, form: Form, values: Values) -> list[tuple[float, str, list[float]]]:
+def _named_roots(
+    step: DerivationStep, form: Form, values: Values
+) -> list[tuple[float, str, list[float]]]:
     """Return the two roots of a step at the pose: value, name, and the values of the factors of the rule."""
     if step.choice is None:
         return []
@@ -176,7 +182,9 @@ def _letters(form: Form, values: Values) -> dict[str, float]:
     return {letter: _first(values.of(element)) for letter, element in form.letters.items()}
 
 
-def _top(derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values) -> _Drawing:
+def _top(
+    derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values
+) -> _Drawing:
     """Draw the arm's plane seen along axis 1: the point, and for each solution the line in which the arm points."""
     drawing = _Drawing()
     letters = _letters(form, values)
@@ -224,7 +232,9 @@ def _place(derivation: InverseDerivation, values: Values) -> Array:
     return np.array([x, y])
 
 
-def _triangle(derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values) -> _Drawing:
+def _triangle(
+    derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values
+) -> _Drawing:
     """Draw two links and the point that they reach, for both solutions, seen along their axes."""
     drawing = _Drawing()
     letters = _letters(form, values)
@@ -263,7 +273,9 @@ def _triangle(derivation: InverseDerivation, step: DerivationStep, form: Form, v
     return drawing
 
 
-def _slide(derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values) -> _Drawing:
+def _slide(
+    derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values
+) -> _Drawing:
     """Draw the line on which a prismatic joint moves the point, for both solutions, seen along the revolute axis."""
     drawing = _Drawing()
     letters = _letters(form, values)
@@ -313,7 +325,9 @@ def _text(at: _Pixel, text: str, colour: str, lines: Sequence[tuple[_Pixel, _Pix
     half_width = _LETTER * len(text) / 2
     x = min(max(x, half_width), _WIDTH - half_width)
     y += -10 if downwards > 0 else 18
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="{colour}">{escape(text)}</text>'
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="{colour}">{escape(text)}</text>'
+    )
 
 
 def _beside(a: _Pixel, b: _Pixel, text: str, colour: str) -> str:

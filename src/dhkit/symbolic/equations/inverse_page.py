@@ -9,7 +9,12 @@ from html import escape
 from dhkit.description import DHTable
 from dhkit.symbolic.equations.html import equation_mathml, html_page
 from dhkit.symbolic.equations.inverse_figures import figure_of, sample_pose
-from dhkit.symbolic.equations.inverse_text import GIVEN, branches_sentence, introduction, rule_in_dollars
+from dhkit.symbolic.equations.inverse_text import (
+    GIVEN,
+    branches_sentence,
+    introduction,
+    rule_in_dollars,
+)
 from dhkit.symbolic.equations.inverse_writing import Phrases, solved_before
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.steps import DerivationStep
@@ -55,7 +60,9 @@ def _body(derivation: InverseDerivation) -> str:
         parts += [_display(f"{name} = {value}") for name, value in joints]
     for condition in derivation.conditions:
         parts.append(f"<p>{escape(condition.look)}</p>")
-        parts.append(_display(f"{write.element(condition.left)} = {write.element(condition.right)}"))
+        parts.append(
+            _display(f"{write.element(condition.left)} = {write.element(condition.right)}")
+        )
     parts.append(f"<p>{escape(branches_sentence(derivation))}</p>")
     parts += [f'<p class="note">{escape(note)}</p>' for note in derivation.notes]
     return "\n".join(filter(None, parts))

@@ -22,7 +22,9 @@ from dhkit.symbolic.ring.notation import constants_of, generators_of, symbols_of
 
 _LETTER = re.compile(r"\b[A-Zk]\b")
 """A letter of a form: A, B, C ... and k."""
-_LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"])
+_LOCAL = frozenset(
+    ["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"]
+)
 """Names that the code around the statements uses."""
 
 
@@ -113,7 +115,9 @@ class _CodeWriter:
     def brackets(self, inner: str) -> str:
         return f"({inner})"
 
-    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:
+    def product(
+        self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]
+    ) -> str:
         factors = list(numerator)
         if coefficient != 1 or not numerator:
             is_double = Fraction(float(coefficient)) == coefficient
@@ -176,7 +180,9 @@ class _Statements:
             if own in self.names:
                 row, column = _entry(name)
                 pose.append((self.names[own], row, column))
-        constants = [(self.names[name], value) for name, value in chain.lengths.items() if name in self.names]
+        constants = [
+            (self.names[name], value) for name, value in chain.lengths.items() if name in self.names
+        ]
 
         statements: list[Statement] = []
         for step in derivation.steps:
@@ -280,7 +286,9 @@ class _Statements:
 
     def _words(self, form: Form) -> dict[str, str]:
         """Return the values of the placeholders in a form's code, in its letters; squares are written as products."""
-        derived = {k: re.sub(r"\b([A-Zk])\^2", r"\1*\1", text) for k, (text, _) in form.derived.items()}
+        derived = {
+            k: re.sub(r"\b([A-Zk])\^2", r"\1*\1", text) for k, (text, _) in form.derived.items()
+        }
         return {k: derived.get(k, k) for k in self._placeholders(form)}
 
     def _letters(self, form: Form) -> list[str]:

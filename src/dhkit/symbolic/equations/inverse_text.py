@@ -28,7 +28,11 @@ def inverse_text(derivation: InverseDerivation) -> str:
         lines += ["", f"{number}. {_title(write, step)}", *_step(derivation, write, step)]
     joints = list(write.joint_values())
     if joints:
-        lines += ["", "Joint values, turned into (-pi, pi]", *(f"   {name} = {value}" for name, value in joints)]
+        lines += [
+            "",
+            "Joint values, turned into (-pi, pi]",
+            *(f"   {name} = {value}" for name, value in joints),
+        ]
     for condition in derivation.conditions:
         left = write.element(condition.left)
         right = write.element(condition.right)
@@ -45,7 +49,9 @@ def inverse_table(derivation: InverseDerivation) -> str:
     rows = []
     for step in derivation.steps:
         # Title, equation and solution; the title stands in the step's first row alone.
-        step_rows = [["", f"{write.name(d.name)} = {write.element(d.element)}", ""] for d in step.definitions]
+        step_rows = [
+            ["", f"{write.name(d.name)} = {write.element(d.element)}", ""] for d in step.definitions
+        ]
         if step.form is not None:
             solution = write.solution(step.form)
             solved = f"{solution.unknown} = {' or '.join(solution.alternatives)}"
@@ -59,14 +65,21 @@ def inverse_table(derivation: InverseDerivation) -> str:
             step_rows[0][0] = _title(write, step)
         rows += step_rows
     caption = f"{derivation.description.name}: joint by joint"
-    return html_table(("what is found", "equations", "solution"), rows, caption, most=len(rows), longest=_LONGEST_LINE)
+    return html_table(
+        ("what is found", "equations", "solution"),
+        rows,
+        caption,
+        most=len(rows),
+        longest=_LONGEST_LINE,
+    )
 
 
 def introduction(derivation: InverseDerivation) -> list[str]:
     """Return the sentences before the first step."""
     kinds = derivation.description.kinds
     has_offsets = any(
-        kind == "R" and not offset.is_zero for kind, offset in zip(kinds, derivation.chain.offsets, strict=True)
+        kind == "R" and not offset.is_zero
+        for kind, offset in zip(kinds, derivation.chain.offsets, strict=True)
     )
     angle = "theta_i is the table's angle of joint i: "
     angle += "the joint value q_i plus its offset" if has_offsets else "the joint value q_i"
@@ -77,13 +90,21 @@ def introduction(derivation: InverseDerivation) -> list[str]:
         symbols += f", s{label} and c{label} those of {summed}"
     elif derivation.sum:
         symbols += ", sphi and cphi those of phi"
-    return [f"{derivation.geometry[0].upper()}{derivation.geometry[1:]}.", GIVEN, f"{angle}; {symbols}."]
+    return [
+        f"{derivation.geometry[0].upper()}{derivation.geometry[1:]}.",
+        GIVEN,
+        f"{angle}; {symbols}.",
+    ]
 
 
 def branches_sentence(derivation: InverseDerivation) -> str:
     """Return a sentence about the branches."""
     count = len(derivation.branches)
-    aims = " They point the tool at the pose's origin, at whatever distance." if derivation.family.aims else ""
+    aims = (
+        " They point the tool at the pose's origin, at whatever distance."
+        if derivation.family.aims
+        else ""
+    )
     return f"{count} branches: {', '.join(derivation.branches)}.{aims}"
 
 
@@ -104,7 +125,9 @@ def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -
     if used:
         yield f"{indent}known from before: {', '.join(used)}"
     for definition in step.definitions:
-        yield from broken_lines(f"{indent}{write.name(definition.name)} = ", write.element(definition.element))
+        yield from broken_lines(
+            f"{indent}{write.name(definition.name)} = ", write.element(definition.element)
+        )
     if step.form is None:
         return
     equations = write.equations(step)
@@ -130,7 +153,10 @@ def inverse_latex(derivation: InverseDerivation) -> str:
     for step in derivation.steps:
         title = f"${write.unknown(step.unknown)}$" if step.unknown else escaped(step.title)
         parts += [rf"\subsection*{{{title}}}", escaped(step.look)]
-        displays = [(write.name(definition.name), write.element(definition.element)) for definition in step.definitions]
+        displays = [
+            (write.name(definition.name), write.element(definition.element))
+            for definition in step.definitions
+        ]
         if step.form is not None:
             solution = write.solution(step.form)
             solved = (solution.unknown, r" \quad\text{or}\quad ".join(solution.alternatives))
@@ -139,7 +165,9 @@ def inverse_latex(derivation: InverseDerivation) -> str:
         rows = [f"{left} &= {right}" for left, right in displays]
         parts.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
         if step.choice:
-            parts.append(_latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}."))
+            parts.append(
+                _latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}.")
+            )
         if step.nothing:
             parts.append(escaped(f"No solution where {step.nothing}."))
         if step.singular:
@@ -153,7 +181,10 @@ def inverse_latex(derivation: InverseDerivation) -> str:
     for condition in derivation.conditions:
         sides = f"{write.element(condition.left)} &= {write.element(condition.right)}"
         parts += [escaped(condition.look), f"\\begin{{align*}}\n{sides}\n\\end{{align*}}"]
-    parts += [escaped(branches_sentence(derivation)), *(escaped(f"Note: {note}.") for note in derivation.notes)]
+    parts += [
+        escaped(branches_sentence(derivation)),
+        *(escaped(f"Note: {note}.") for note in derivation.notes),
+    ]
     return "\n\n".join(parts) + "\n"
 
 

@@ -118,7 +118,10 @@ class Phrases:
         derived = form.derived
 
         # Short values are written into the formulas.
-        values = {k: self.element(derived[k][1] if k in derived else form.letters[k]) for k in placeholders}
+        values = {
+            k: self.element(derived[k][1] if k in derived else form.letters[k])
+            for k in placeholders
+        }
         if sum(map(len, values.values())) <= _INLINE * (2 if self.is_latex else 1):
             alternatives = [_filled(template, values).removeprefix("0 ") for template in templates]
             return Solution(name, tuple(alternatives), ())
@@ -136,7 +139,9 @@ class Phrases:
         letters = [(k, self.element(form.letters[k])) for k in occurring if k in form.letters]
         if isinstance(form, Circle) and form.letters["B"].is_zero:
             if self.is_latex:
-                letters.append((r"\mathrm{atan2}(0,\, A)", r"0 \text{ where } A > 0, \text{ else } \pi"))
+                letters.append(
+                    (r"\mathrm{atan2}(0,\, A)", r"0 \text{ where } A > 0, \text{ else } \pi")
+                )
             else:
                 letters.append(("atan2(0, A)", "0 where A > 0, else pi"))
         alternatives = [_filled(template, in_letters) for template in templates]
@@ -172,7 +177,9 @@ class Phrases:
     def joint_values(self) -> Iterator[tuple[str, str]]:
         """Yield joints whose table has an offset, with their value: q2, theta2 - pi/2."""
         derivation = self.derivation
-        for i, (kind, offset) in enumerate(zip(derivation.description.kinds, derivation.chain.offsets, strict=True)):
+        for i, (kind, offset) in enumerate(
+            zip(derivation.description.kinds, derivation.chain.offsets, strict=True)
+        ):
             if kind == "R" and not offset.is_zero:
                 summand = self.constants(-offset)
                 signed = f"- {summand[1:]}" if summand.startswith("-") else f"+ {summand}"
@@ -234,7 +241,9 @@ def solved_before(derivation: InverseDerivation, step: DerivationStep) -> list[s
     return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints) if i >= 0]
 
 
-def _joints_of_quantities(derivation: InverseDerivation, step: DerivationStep) -> dict[str, set[int]]:
+def _joints_of_quantities(
+    derivation: InverseDerivation, step: DerivationStep
+) -> dict[str, set[int]]:
     """Return the joints that each quantity of the steps before one depends on, by name; phi is such a quantity."""
     names = derivation.chain.names
     found = dict[str, set[int]]()

@@ -32,7 +32,9 @@ _LINE = 62
 _SYMBOLS_PER_EM = 2
 """Number of symbols that take the width of an em."""
 _FRACTION = re.compile(r"\\t?frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}")
-_INVISIBLE = re.compile(r"\\(?:d?dot|[bB]ig[lr]|left|right|mathrm|mathit|sqrt|,|(?=(?:arc)?(?:sin|cos|tan)))")
+_INVISIBLE = re.compile(
+    r"\\(?:d?dot|[bB]ig[lr]|left|right|mathrm|mathit|sqrt|,|(?=(?:arc)?(?:sin|cos|tan)))"
+)
 """Commands that print nothing beside other symbols; of a function's name, the backslash."""
 _INDENT = r"\qquad "
 _BREAK = "\n"
@@ -43,7 +45,14 @@ _ZEROS = 6
 """Names per line in the list of entries that are zero."""
 _HEADS = {"tau": r"\tau"}
 """Quantities whose name is a Greek letter."""
-_WHOLE = {"T": "T(q)", "J": "J(q)", "M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
+_WHOLE = {
+    "T": "T(q)",
+    "J": "J(q)",
+    "M": "M(q)",
+    "C": r"C(q,\dot{q})",
+    "h": r"h(q,\dot{q})",
+    "g": "g(q)",
+}
 """Matrices and vectors with their arguments, which also distinguish the vector g from the constant."""
 
 
@@ -83,14 +92,20 @@ class LatexWriter:
     def brackets(self, inner: str) -> str:  # noqa: D102
         return _bracketed(inner)
 
-    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
+    def product(  # noqa: D102
+        self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]
+    ) -> str:
         decimal = readable_decimal(coefficient)
         number = _number(coefficient) if decimal is None else _scientific(decimal)
         factors = list(numerator)
 
         # The first factor, or the number alone, is written over the denominator.
         if denominator:
-            divisor = _without_brackets(denominator[0]) if len(denominator) == 1 else " ".join(denominator)
+            divisor = (
+                _without_brackets(denominator[0])
+                if len(denominator) == 1
+                else " ".join(denominator)
+            )
             dividend = factors.pop(0) if factors else number
             if dividend == number:
                 number = ""

@@ -27,7 +27,9 @@ ok = all(isfinite(T(1:3, 4))) && all(abs(off(:)) <= 2e-6) && abs(T(4, 4) - 1) <=
 end"""
 
 
-def matlab_files(source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> dict[str, str]:
+def matlab_files(
+    source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]
+) -> dict[str, str]:
     """Return function files by name: ``NAME_M.m`` with ``M = NAME_M(q, p)``, and so on; vectors are columns.
 
     ``p`` is a structure of parameters, that of ``NAME_parameters.m`` unless given.
@@ -42,9 +44,13 @@ def matlab_files(source: Lagrangian | SymbolicKinematics, quantities: Sequence[Q
     return files
 
 
-def equations_matlab(source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
+def equations_matlab(
+    source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]
+) -> str:
     """Return all functions as one text, each after a comment with its file's name."""
-    return "\n".join(f"% ---- {name}\n{text}" for name, text in matlab_files(source, quantities).items())
+    return "\n".join(
+        f"% ---- {name}\n{text}" for name, text in matlab_files(source, quantities).items()
+    )
 
 
 def _parameters(functions: FunctionSet) -> Iterator[str]:

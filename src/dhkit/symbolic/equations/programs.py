@@ -123,11 +123,15 @@ def function_set(
     """Return quantities as functions in a language."""
     # The parameters that occur, in the order of the robot file.
     constants = constants_of(generators_of(elements_of(quantities)))
-    order = {name: k for k, name in enumerate([*source.description.parameters, *source.arm.parameters])}
+    order = {
+        name: k for k, name in enumerate([*source.description.parameters, *source.arm.parameters])
+    }
     names = sorted(symbols_of(constants), key=lambda name: (order.get(name, len(order)), name))
     identifiers = _identifiers(names)
     values = dict(source.description.numbers.values) | source.arm.parameters
-    parameters = [Parameter(identifiers[x], harmless(x), float(values.get(x, math.nan))) for x in names]
+    parameters = [
+        Parameter(identifiers[x], harmless(x), float(values.get(x, math.nan))) for x in names
+    ]
 
     code = _Code(language, identifiers)
     return FunctionSet(
@@ -136,7 +140,9 @@ def function_set(
         n=source.n,
         parameters=tuple(parameters),
         functions=tuple(code.function(quantity) for quantity in quantities),
-        notes=tuple(f"{harmless(name)} is {own}" for name, own in identifiers.items() if name != own),
+        notes=tuple(
+            f"{harmless(name)} is {own}" for name, own in identifiers.items() if name != own
+        ),
     )
 
 
@@ -176,7 +182,9 @@ class _Code:
     def brackets(self, inner: str) -> str:
         return f"({inner})"
 
-    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:
+    def product(
+        self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]
+    ) -> str:
         factors = list(numerator)
         if coefficient != 1 or not numerator:
             factors.insert(0, repr(float(coefficient)))

@@ -49,7 +49,9 @@ def is_pose(T):
     return determinant > 0'''
 
 
-def equations_python(source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
+def equations_python(
+    source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]
+) -> str:
     """Return a module with a function for each quantity: ``mass_matrix(q, p=PARAMETERS)`` and so on.
 
     Arrays may have leading batch axes. Other parameters: ``dataclasses.replace(PARAMETERS, m2=0.5)``.
@@ -95,7 +97,9 @@ def _function(functions: FunctionSet, function: Function) -> Iterator[str]:
     yield f"    {quantity.name} = np.zeros((*q.shape[:-1]{shape or ','}))"
     for entry in function.entries:
         yield from python_lines(entry, "    ")
-    yield f"    return {quantity.name}" + ("" if shape else "[()]")  # V[()]: a number where V has no axes
+    yield f"    return {quantity.name}" + (
+        "" if shape else "[()]"
+    )  # V[()]: a number where V has no axes
 
 
 def inverse_python(derivation: InverseDerivation) -> dict[str, str]:

@@ -105,11 +105,18 @@ def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     names = _listed(what)
     unknown = [name for name in names if name not in QUANTITIES]
     if unknown or not names:
-        raise ValueError(f"no quantity {unknown[0] if unknown else ''!r}; expected some of {', '.join(QUANTITIES)}")
-    return [Quantity(name, shortened(lag.arm, element_array(getattr(lag, name)))) for name in dict.fromkeys(names)]
+        raise ValueError(
+            f"no quantity {unknown[0] if unknown else ''!r}; expected some of {', '.join(QUANTITIES)}"
+        )
+    return [
+        Quantity(name, shortened(lag.arm, element_array(getattr(lag, name))))
+        for name in dict.fromkeys(names)
+    ]
 
 
-def kinematic_quantities(kinematics: SymbolicKinematics, what: str | Sequence[str]) -> list[Quantity]:
+def kinematic_quantities(
+    kinematics: SymbolicKinematics, what: str | Sequence[str]
+) -> list[Quantity]:
     """Return A1 ... An (A: all of them), T and J by name, in the angles that make each entry shortest.
 
     Raises
@@ -133,7 +140,9 @@ def kinematic_quantities(kinematics: SymbolicKinematics, what: str | Sequence[st
 def is_kinematic(what: str | Sequence[str]) -> bool:
     """Return whether all names are of kinematics: A, A1 ... An, T, J."""
     names = _listed(what)
-    return bool(names) and all(name in KINEMATIC_QUANTITIES or _LINK.fullmatch(name) for name in names)
+    return bool(names) and all(
+        name in KINEMATIC_QUANTITIES or _LINK.fullmatch(name) for name in names
+    )
 
 
 def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:

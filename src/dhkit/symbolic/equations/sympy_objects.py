@@ -40,7 +40,9 @@ class SympyWriter:
         if not generator.joints:  # a rate, an acceleration, or the position of a prismatic joint
             return self._sympy.Symbol(generator.text)
         # The sine or cosine of a sum of joint angles.
-        angle = self._sympy.Add(*(self._sympy.Symbol(f"q{joint + 1}") for joint in generator.joints))
+        angle = self._sympy.Add(
+            *(self._sympy.Symbol(f"q{joint + 1}") for joint in generator.joints)
+        )
         return self._sympy.sin(angle) if generator.kind == "sine" else self._sympy.cos(angle)
 
     def pi(self) -> Any:  # noqa: D102
@@ -55,7 +57,9 @@ class SympyWriter:
     def brackets(self, inner: Any) -> Any:  # noqa: D102
         return inner  # an expression tree needs none
 
-    def product(self, coefficient: Fraction, numerator: Sequence[Any], denominator: Sequence[Any]) -> Any:  # noqa: D102
+    def product(  # noqa: D102
+        self, coefficient: Fraction, numerator: Sequence[Any], denominator: Sequence[Any]
+    ) -> Any:
         number = self._sympy.Rational(coefficient.numerator, coefficient.denominator)
         return self._sympy.Mul(number, *numerator, *(divisor**-1 for divisor in denominator))
 
@@ -86,5 +90,7 @@ def equations_sympy(quantities: Sequence[Quantity]) -> dict[str, object]:
     for quantity in quantities:
         # vectorize also takes an array without axes, that of a scalar.
         entries = np.vectorize(sympy_object, otypes=[object])(quantity.elements)
-        found[quantity.name] = sympy.Matrix(entries.tolist()) if quantity.elements.ndim else entries.item()
+        found[quantity.name] = (
+            sympy.Matrix(entries.tolist()) if quantity.elements.ndim else entries.item()
+        )
     return found

@@ -45,7 +45,9 @@ class TextWriter:
     def brackets(self, inner: str) -> str:  # noqa: D102
         return f"({inner})"
 
-    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
+    def product(  # noqa: D102
+        self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]
+    ) -> str:
         factors = list(numerator)
         divisors = list(denominator)
         decimal = readable_decimal(coefficient)
@@ -92,7 +94,10 @@ def equations_text(quantities: Sequence[Quantity]) -> str:
     check_length(quantities)
     blocks = ["\n".join(_entry_lines(quantity)) for quantity in quantities]
     elements = elements_of(quantities)
-    angles = [f"{angle.name} = {angle.function}({angle.text})" for angle in angles_of(generators_of(elements))]
+    angles = [
+        f"{angle.name} = {angle.function}({angle.text})"
+        for angle in angles_of(generators_of(elements))
+    ]
     if angles:
         blocks.append("\n".join(_filled_lines("where ", angles)))
     notes = renamings(elements)
@@ -144,7 +149,9 @@ def _terms(text: str) -> list[str]:
     return [term for term in terms if term]
 
 
-def _filled_lines(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
+def _filled_lines(
+    head: str, words: Sequence[str], tail: str = "", separator: str = ", "
+) -> list[str]:
     """Return words after a head, with as many on a line as it holds."""
     following = list(words[1:])
     if tail:

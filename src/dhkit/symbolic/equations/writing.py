@@ -57,7 +57,10 @@ class Printer(Generic[T]):
     """
 
     def __init__(
-        self, generators: Sequence[Generator], writer: Writer[T], constant: Callable[[Generator], T] | None = None
+        self,
+        generators: Sequence[Generator],
+        writer: Writer[T],
+        constant: Callable[[Generator], T] | None = None,
     ) -> None:
         self.writer = writer
         self._constant = constant or (lambda generator: self._atom_like(generator))
@@ -80,7 +83,9 @@ class Printer(Generic[T]):
             numerator.append(writer.brackets(self.sum(product.motion)))
         elif product.motion:
             numerator += self._powers(product.motion[0].powers, reciprocals=False)
-        return writer.product(abs(product.coefficient), numerator, self._powers(product.powers, reciprocals=True))
+        return writer.product(
+            abs(product.coefficient), numerator, self._powers(product.powers, reciprocals=True)
+        )
 
     def expression(self, expression: Expression) -> T:
         """Return an expression of constants."""
@@ -89,7 +94,9 @@ class Printer(Generic[T]):
         for monomial, coefficient in expression.terms:
             numerator = [self._power(self.atom(atom), e) for atom, e in monomial if e > 0]
             denominator = [self._power(self.atom(atom), -e) for atom, e in monomial if e < 0]
-            terms.append((coefficient < 0, writer.product(abs(coefficient), numerator, denominator)))
+            terms.append(
+                (coefficient < 0, writer.product(abs(coefficient), numerator, denominator))
+            )
         return self._total(terms)
 
     def _total(self, terms: Sequence[tuple[bool, T]]) -> T:
@@ -104,12 +111,18 @@ class Printer(Generic[T]):
         if atom.name == "group":
             return self.writer.brackets(self.expression(atom.arguments[0]))
         if atom.arguments:
-            return self.writer.call(atom.name, [self.expression(argument) for argument in atom.arguments])
+            return self.writer.call(
+                atom.name, [self.expression(argument) for argument in atom.arguments]
+            )
         return self.writer.pi() if atom.name == "pi" else self.writer.symbol(atom.name)
 
     def _powers(self, powers: Powers, *, reciprocals: bool) -> list[T]:
         """Return the factors that are reciprocals, as their denominators, or those that are not."""
-        return [self._power(self._generator(k), e) for k, e in powers if self._is_reciprocal[k] == reciprocals]
+        return [
+            self._power(self._generator(k), e)
+            for k, e in powers
+            if self._is_reciprocal[k] == reciprocals
+        ]
 
     def _power(self, base: T, exponent: int) -> T:
         return base if exponent == 1 else self.writer.power(base, exponent)

@@ -71,15 +71,21 @@ class BaseParameters:
         return len(self.definitions)
 
     def __repr__(self) -> str:
-        return repr_line("BaseParameters", f"{self.full.description.name}, {len(self)}", ", ".join(self.names))
+        return repr_line(
+            "BaseParameters", f"{self.full.description.name}, {len(self)}", ", ".join(self.names)
+        )
 
     def _repr_html_(self) -> str:
         rows = []
         for name in self.names[:MOST_ROWS]:
             element = self.definitions[name]
-            rows.append((name, str(element) if len(element) <= _READABLE else counted(len(element), "term")))
+            rows.append(
+                (name, str(element) if len(element) <= _READABLE else counted(len(element), "term"))
+            )
         caption = f"Base parameters of {self.full.description.name}"
-        return html_table(("parameter", "stands for"), rows, caption, count=len(self), longest=_LONGEST_DEFINITION)
+        return html_table(
+            ("parameter", "stands for"), rows, caption, count=len(self), longest=_LONGEST_DEFINITION
+        )
 
     def prove(self) -> Proof:
         """Decide whether the equations in base parameters equal the full ones, by substituting the definitions.
@@ -88,7 +94,10 @@ class BaseParameters:
         """
         short = self.lagrangian
         full = self.full
-        definitions = {short.arm.ring.place("constant", name): element for name, element in self.definitions.items()}
+        definitions = {
+            short.arm.ring.place("constant", name): element
+            for name, element in self.definitions.items()
+        }
 
         substituted = _substitute(np.column_stack([short.M, short.g]), full.arm.ring, definitions)
         difference = substituted - np.column_stack([full.M, full.g])
@@ -214,7 +223,9 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
 
     # Values of the base parameters: their definitions, which do not depend on the state.
     generator_values = arm.ring.values(arm.values, np.zeros(arm.n))
-    base_values = {name: float(element.value(generator_values)) for name, element in definitions.items()}
+    base_values = {
+        name: float(element.value(generator_values)) for name, element in definitions.items()
+    }
     kept_values = {text: arm.values[text] for text in ring.constants if text in arm.values}
 
     short = replace(

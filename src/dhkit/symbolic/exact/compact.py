@@ -59,7 +59,9 @@ def shortened(arm: ExactArm, elements: Elements) -> Elements:
     shortest = np.empty(elements.shape, dtype=object)
     for place, element in np.ndenumerate(elements):
         candidates = [element]
-        candidates += [_merge_angles(translated(element, ring, directions)) for ring, directions in writings]
+        candidates += [
+            _merge_angles(translated(element, ring, directions)) for ring, directions in writings
+        ]
         shortest[place] = min(candidates, key=len)
     return shortest
 
@@ -70,12 +72,16 @@ def shortened_alike(arm: ExactArm, elements: Sequence[Element]) -> list[Element]
     candidates = [list(elements)]
     if runs:
         for ring, directions in _rings_in_other_angles(arm.ring, tuple(runs)):
-            candidates.append([_merge_angles(translated(element, ring, directions)) for element in elements])
+            candidates.append(
+                [_merge_angles(translated(element, ring, directions)) for element in elements]
+            )
     return min(candidates, key=lambda written: sum(map(len, written)))
 
 
 @lru_cache(maxsize=64)
-def _rings_in_other_angles(ring: Ring, runs: tuple[tuple[int, ...], ...]) -> list[tuple[Ring, dict[int, Element]]]:
+def _rings_in_other_angles(
+    ring: Ring, runs: tuple[tuple[int, ...], ...]
+) -> list[tuple[Ring, dict[int, Element]]]:
     """Return rings in other angles, each with the sines and cosines of the given ring's joints in its own."""
     sums: list[tuple[int, ...]] = []
     for run in runs:
@@ -162,7 +168,9 @@ def _subtract(terms: dict[Monomial, Fraction], a: _Places, b: _Places, differenc
     return cosines or sines
 
 
-def _merge_pairs(terms: dict[Monomial, Fraction], first: _Pair, second: _Pair, merged: int, sign: int) -> bool:
+def _merge_pairs(
+    terms: dict[Monomial, Fraction], first: _Pair, second: _Pair, merged: int, sign: int
+) -> bool:
     """Replace k x first + sign k x second by k x merged, for each monomial x; return whether any was replaced.
 
     ``first`` and ``second`` are products of two generators, ``merged`` is one generator.

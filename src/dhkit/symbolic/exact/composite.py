@@ -28,7 +28,9 @@ class JointTransform:
     """Shape (3,)."""
 
     @classmethod
-    def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> JointTransform:
+    def of(
+        cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow
+    ) -> JointTransform:
         """Return Tx(a) Rx(alpha) Rz(theta) Tz(d)."""
         ca, sa = alpha
         c, s = row.theta
@@ -56,7 +58,9 @@ class RigidBody:
     """Shape (3, 3)."""
 
     def __add__(self, other: RigidBody) -> RigidBody:
-        return RigidBody(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
+        return RigidBody(
+            self.mass + other.mass, self.moment + other.moment, self.second + other.second
+        )
 
     def moved(self, step: JointTransform) -> RigidBody:
         """Return the body in the frame before, by Steiner's theorem in first moments."""
@@ -139,7 +143,10 @@ def joint_steps(arm: ExactArm) -> list[JointTransform]:
         return [JointTransform.of(ring, row.a, row.alpha, row) for row in arm.rows]
     # In a standard row a and alpha follow the joint: they belong to the next joint's transform.
     before = [(ring.zero, (ring.one, ring.zero)), *((row.a, row.alpha) for row in arm.rows[:-1])]
-    return [JointTransform.of(ring, a, alpha, row) for (a, alpha), row in zip(before, arm.rows, strict=True)]
+    return [
+        JointTransform.of(ring, a, alpha, row)
+        for (a, alpha), row in zip(before, arm.rows, strict=True)
+    ]
 
 
 def joint_bodies(arm: ExactArm) -> list[RigidBody]:
@@ -152,7 +159,10 @@ def joint_bodies(arm: ExactArm) -> list[RigidBody]:
     # Bodies are given in DH frames; a modified DH frame is the joint's frame.
     if not arm.is_standard:
         return links
-    return [link.moved(_dh_frame_in_joint_frame(arm.ring, row)) for link, row in zip(links, arm.rows, strict=True)]
+    return [
+        link.moved(_dh_frame_in_joint_frame(arm.ring, row))
+        for link, row in zip(links, arm.rows, strict=True)
+    ]
 
 
 def _dh_frame_in_joint_frame(ring: Ring, row: ExactRow) -> JointTransform:

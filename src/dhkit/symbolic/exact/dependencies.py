@@ -112,7 +112,9 @@ class _Regressor:
         numbers = np.zeros((len(rows), len(names)))
         for k, row in enumerate(rows.values()):
             for name, entry in row.items():
-                numbers[k, names.index(name)] = sum(_term_value(m, c, values) for m, c in entry.items())
+                numbers[k, names.index(name)] = sum(
+                    _term_value(m, c, values) for m, c in entry.items()
+                )
         return cls(ring, names, list(rows.values()), numbers)
 
     def column(self, name: str) -> Array:
@@ -164,21 +166,29 @@ class _Regressor:
             y = [self._entry(k, name) for k in rows]
             denominator = _determinant(A)
             numerators = [_determinant(_with_column(A, j, y)) for j in range(len(A))]
-            quotients = [ring.polynomials.quotient(x.polynomial, denominator.polynomial) for x in numerators]
+            quotients = [
+                ring.polynomials.quotient(x.polynomial, denominator.polynomial) for x in numerators
+            ]
             if all(quotient is not None for quotient in quotients):
-                return {other: Element(ring, f) for other, f in zip(support, quotients, strict=True)}
+                return {
+                    other: Element(ring, f) for other, f in zip(support, quotients, strict=True)
+                }
             first_fractions = first_fractions or (numerators, denominator)
 
         # No choice of rows gives factors without a denominator.
         if first_fractions is None:
-            raise RingError(f"{name} depends on {', '.join(support)}, but not exactly; base parameters were not found")
+            raise RingError(
+                f"{name} depends on {', '.join(support)}, but not exactly; base parameters were not found"
+            )
         numerators, denominator = first_fractions
         reciprocal = 1 / _expression(denominator)
         try:
             factor = ring.read(reciprocal)
         except RingError:
             raise MissingReciprocalError(reciprocal) from None
-        return {other: numerator * factor for other, numerator in zip(support, numerators, strict=True)}
+        return {
+            other: numerator * factor for other, numerator in zip(support, numerators, strict=True)
+        }
 
     def _entry(self, row: int, name: str) -> Element:
         """Return an exact entry of the regressor."""
@@ -202,7 +212,10 @@ def _random_values(ring: Ring) -> list[float]:
     """Return a value for each generator: random for constants, so that the ring's relations hold; 1 for the state."""
     rng = np.random.default_rng(0)
     symbols = frozenset[str]().union(*(constant.symbols for constant in ring.given))
-    values = {name: exact(float(x)) for name, x in zip(sorted(symbols), rng.uniform(0.5, 2.0, 1000), strict=False)}
+    values = {
+        name: exact(float(x))
+        for name, x in zip(sorted(symbols), rng.uniform(0.5, 2.0, 1000), strict=False)
+    }
 
     known: dict[str, float] = {}
     for constant in ring.given:

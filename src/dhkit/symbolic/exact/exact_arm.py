@@ -178,7 +178,9 @@ class ExactArm:
 
 
 @lru_cache(maxsize=32)
-def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> ExactArm:
+def exact_arm(
+    description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()
+) -> ExactArm:
     """Return a description in a ring; equal arguments give equal rings, so that results can be compared.
 
     Parameters
@@ -213,8 +215,12 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     base_xyz = [naming.known(x) for x in base.xyz]
     base_rpy = [exact_angle(naming.known(x)) for x in base.rpy]
     tool = [naming.known(x) for x in description.tool.placement.xyz]
-    viscous = [naming.known(joint.drive.viscous) if joint.drive else ZERO for joint in description.joints]
-    couplings = [(*coupling.joints, naming.coupling(coupling)) for coupling in description.couplings]
+    viscous = [
+        naming.known(joint.drive.viscous) if joint.drive else ZERO for joint in description.joints
+    ]
+    couplings = [
+        (*coupling.joints, naming.coupling(coupling)) for coupling in description.couplings
+    ]
 
     # The ring that contains them.
     shared_inertias = [inertia for *_, inertia in couplings]
@@ -246,7 +252,9 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         gravity=R.T @ np.array([ring.read(x) for x in gravity], dtype=object),
         origin=R.T @ np.array([ring.read(x) for x in base_xyz], dtype=object),
         tool=np.array([ring.read(x) for x in tool], dtype=object),
-        values={text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+        values={
+            text: value_of(constant, naming.values) for text, constant in constants.found.items()
+        },
         parameters={name: float(naming.values[name]) for name in _symbols(constants)},
         notes=tuple(constants.notes),
         inertial=tuple(naming.inertial),

@@ -60,7 +60,9 @@ class Proof:
     @property
     def places(self) -> tuple[tuple[int, ...], ...]:
         """Indices, from 0, of the entries in which the two sides differ."""
-        return tuple(place for place, element in np.ndenumerate(self.difference) if not element.is_zero)
+        return tuple(
+            place for place, element in np.ndenumerate(self.difference) if not element.is_zero
+        )
 
     def __str__(self) -> str:
         if self:
@@ -198,9 +200,13 @@ class Lagrangian:
                 raise ValueError(f"no quantity {name!r}; expected {', '.join(QUANTITIES)}")
             shape = np.shape(getattr(self, name))
             entries = np.ravel(np.asarray(given, dtype=object)) if shape else [given]
-            in_ring = all(isinstance(entry, Element) and entry.ring == self.arm.ring for entry in entries)
+            in_ring = all(
+                isinstance(entry, Element) and entry.ring == self.arm.ring for entry in entries
+            )
             if np.shape(given) != shape or not in_ring:
-                raise ValueError(f"{name}: expected an array of shape {shape} of elements of these equations' ring")
+                raise ValueError(
+                    f"{name}: expected an array of shape {shape} of elements of these equations' ring"
+                )
 
         M = quantities.pop("M", self.M)
         V = quantities.pop("V", self.V)
@@ -257,7 +263,9 @@ class Lagrangian:
         return f"{self.description.name}: M qdd + C qd + g = tau, M of {size} terms; .text(('g',)) prints a part"
 
     def __repr__(self) -> str:
-        return repr_line("Lagrangian", self.description.name, ", ".join(self.arm.ring.constants) or "in numbers")
+        return repr_line(
+            "Lagrangian", self.description.name, ", ".join(self.arm.ring.constants) or "in numbers"
+        )
 
     def _repr_latex_(self) -> str | None:
         return self.latex() if sum(len(element) for element in self.M.flat) <= READABLE else None
@@ -300,7 +308,9 @@ class Lagrangian:
 
 
 @takes_robot
-def lagrangian(description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()) -> Lagrangian:
+def lagrangian(
+    description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()
+) -> Lagrangian:
     """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for the arguments."""
     arm = exact_arm(description, symbols, needed)
     return Lagrangian(arm, composite.mass_matrix(arm), composite.potential_energy(arm))

@@ -70,7 +70,9 @@ class Naming:
             self._fixed = self.values
         else:
             dependent = [name for name, value in description.parameters.items() if value.symbols]
-            self._fixed = {name: _in_independent_parameters(description.parameters, name) for name in dependent}
+            self._fixed = {
+                name: _in_independent_parameters(description.parameters, name) for name in dependent
+            }
 
     def known(self, expression: Expression) -> Expression:
         """Return an expression in the symbols that are kept."""
@@ -104,7 +106,10 @@ class Naming:
 
         nonzero = [x for x in vector if not x.is_zero]
         if len(nonzero) != 1:
-            return [x if x.is_zero else self.symbol(f"g{axis}", x) for axis, x in zip("xyz", vector, strict=True)]
+            return [
+                x if x.is_zero else self.symbol(f"g{axis}", x)
+                for axis, x in zip("xyz", vector, strict=True)
+            ]
 
         # One component: +g or -g, with g > 0.
         (component,) = nonzero
@@ -132,15 +137,23 @@ class Naming:
         # All bodies of the link as one: mass m, first moments r = m c, inertia I about the origin of the DH frame.
         m, x, y, z, *second = map(exact, self.description.numbers.inertial_parameters[i].tolist())
         mass = self.inertial_symbol(f"m{number}", m)
-        moments = [self.inertial_symbol(f"r{axis}{number}", r) for axis, r in zip("xyz", (x, y, z), strict=True)]
-        tensor = [self.inertial_symbol(f"I{key}{number}", x) for key, x in zip(INERTIA_PLACES, second, strict=True)]
+        moments = [
+            self.inertial_symbol(f"r{axis}{number}", r)
+            for axis, r in zip("xyz", (x, y, z), strict=True)
+        ]
+        tensor = [
+            self.inertial_symbol(f"I{key}{number}", x)
+            for key, x in zip(INERTIA_PLACES, second, strict=True)
+        ]
         com = [r / mass for r in moments]
         whole = BodyNumbers("", mass, tuple(com), None, tuple(tensor))
 
         if not rotor.is_zero:
             if gear != _ONE:
                 gear = self.symbol(f"G{number}", substitute(drive.gear, self.values))
-            rotor = self.inertial_symbol(f"Jm{number}", substitute(drive.rotor_inertia, self.values))
+            rotor = self.inertial_symbol(
+                f"Jm{number}", substitute(drive.rotor_inertia, self.values)
+            )
         return LinkNumbers(row, (whole,), gear, rotor)
 
     def coupling(self, coupling: Coupling) -> Expression:

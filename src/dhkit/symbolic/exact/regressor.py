@@ -32,7 +32,9 @@ class Regressor:
     Y: Elements
 
     def __repr__(self) -> str:
-        return repr_line("Regressor", self.lagrangian.description.name, " x ".join(map(str, self.Y.shape)))
+        return repr_line(
+            "Regressor", self.lagrangian.description.name, " x ".join(map(str, self.Y.shape))
+        )
 
     @property
     def theta(self) -> Elements:

@@ -91,7 +91,9 @@ class ExactChain:
     in_joint_values: bool = False
 
     @classmethod
-    def of(cls, description: Description, *, named: bool, in_joint_values: bool = False) -> ExactChain:
+    def of(
+        cls, description: Description, *, named: bool, in_joint_values: bool = False
+    ) -> ExactChain:
         """Return an arm's chain; lengths that are numbers get names (a2, d3) if ``named``, else all are numbers."""
         naming = Naming(description, "inertial" if named else "none")
 
@@ -143,7 +145,10 @@ class ExactChain:
             alpha=tuple(alpha),
             d=tuple(d),
             offsets=tuple(thetas),
-            values={text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+            values={
+                text: value_of(constant, naming.values)
+                for text, constant in constants.found.items()
+            },
             lengths={name: float(naming.values[name]) for name in sorted(taken)},
             notes=tuple(constants.notes),
             in_joint_values=in_joint_values,
@@ -172,11 +177,15 @@ class ExactChain:
 
     def joint(self, i: int) -> Elements:
         """Return J_i, i from 1, shape (4, 4)."""
-        return rotation(self.ring, 0, 1, self.cosine_and_sine(i)) @ translation(self.ring, 2, self.d[i - 1])
+        return rotation(self.ring, 0, 1, self.cosine_and_sine(i)) @ translation(
+            self.ring, 2, self.d[i - 1]
+        )
 
     def link(self, i: int) -> Elements:
         """Return C_i, i from 1 to n - 1, shape (4, 4)."""
-        return translation(self.ring, 0, self.a[i - 1]) @ rotation(self.ring, 1, 2, self.alpha[i - 1])
+        return translation(self.ring, 0, self.a[i - 1]) @ rotation(
+            self.ring, 1, 2, self.alpha[i - 1]
+        )
 
     def part(self, first: int, last: int) -> Elements:
         """Return J_first C_first ... J_last C_last, shape (4, 4); without C_n, the identity if ``last`` is smaller."""
@@ -221,7 +230,11 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
     notes: list[str] = []
 
     def rounded(
-        name: str, value: Expression, number: Fraction | None, near: Expression, tolerance: float | Fraction
+        name: str,
+        value: Expression,
+        number: Fraction | None,
+        near: Expression,
+        tolerance: float | Fraction,
     ) -> Expression:
         """Return ``near`` with a note if the number is not 0 and within the tolerance of it, else the value."""
         if not number or abs(near.value() - number) > tolerance:
@@ -241,7 +254,11 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
     def end(name: str, placement: Placement) -> Placement:
         x, y, z = placement.xyz
         roll, pitch, yaw = placement.rpy
-        xyz = (length(f"x of the {name}", x), length(f"y of the {name}", y), length(f"z of the {name}", z))
+        xyz = (
+            length(f"x of the {name}", x),
+            length(f"y of the {name}", y),
+            length(f"z of the {name}", z),
+        )
         rpy = (
             angle(f"roll of the {name}", roll),
             angle(f"pitch of the {name}", pitch),
@@ -275,7 +292,11 @@ def table_lengths(description: Description) -> dict[str, Fraction]:
         for name, length in ((f"a{i}", joint.a), (f"d{i}", joint.d)):
             symbol = naming.length(name, length)
             value = naming.values.get(symbol.text)
-            if symbol.text not in description.parameters and value is not None and value.rational is not None:
+            if (
+                symbol.text not in description.parameters
+                and value is not None
+                and value.rational is not None
+            ):
                 found[symbol.text] = value.rational
     return found
 
@@ -316,6 +337,8 @@ def _known_placement(naming: Naming, placement: Placement) -> Placement:
 def _transform(ring: Ring, placement: Placement) -> Elements:
     """Return Rz(yaw) Ry(pitch) Rx(roll) with an origin, shape (4, 4), m."""
     roll, pitch, yaw = (ring.direction(angle) for angle in placement.rpy)
-    T: Elements = rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
+    T: Elements = (
+        rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
+    )
     T[:3, 3] = [ring.read(length) for length in placement.xyz]
     return T

@@ -21,7 +21,14 @@ from dhkit.symbolic.inverse.chain import POSE, ExactChain, without_rounding
 from dhkit.symbolic.inverse.families import Derivable, family_of
 from dhkit.symbolic.inverse.forms import ZERO_RADICAND, Unknown, lemmas
 from dhkit.symbolic.inverse.missing import why_not
-from dhkit.symbolic.inverse.steps import Choice, Condition, DerivationStep, Workbench, names_in, without_unused
+from dhkit.symbolic.inverse.steps import (
+    Choice,
+    Condition,
+    DerivationStep,
+    Workbench,
+    names_in,
+    without_unused,
+)
 from dhkit.symbolic.inverse.wrists import FLIPS
 from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.elements import element_array
@@ -77,7 +84,8 @@ class InverseProof:
         if failed:
             return f"NOT TRUE: {'; '.join(failed)}. {sampled}"
         return (
-            f"proved: {proved} (the equations hold for T = base A_1 ... A_n tool; their solutions are all). {sampled}"
+            f"proved: {proved} (the equations hold for T = base A_1 ... A_n tool; "
+            f"their solutions are all). {sampled}"
         )
 
     def __str__(self) -> str:
@@ -211,7 +219,9 @@ class InverseDerivation:
         return self.text()
 
     def __repr__(self) -> str:
-        return repr_line("InverseDerivation", self.description.name, f"{self.geometry}, {len(self.steps)} steps")
+        return repr_line(
+            "InverseDerivation", self.description.name, f"{self.geometry}, {len(self.steps)} steps"
+        )
 
     def _repr_html_(self) -> str:
         return str(format_function("inverse_table")(self))
@@ -245,7 +255,9 @@ class InverseDerivation:
         T = world_to_tool(self.description, q)
         found = self.solve(T)
 
-        forms = dict.fromkeys(type(step.form).__name__ for step in self.steps if step.form is not None)
+        forms = dict.fromkeys(
+            type(step.form).__name__ for step in self.steps if step.form is not None
+        )
         return InverseProof(
             identities=tuple(self.identities()),
             lemmas=tuple(lemmas()[name] for name in forms),
@@ -320,7 +332,11 @@ class InverseDerivation:
 
     def candidates(self, T: Array) -> Iterator[tuple[Values, Array]]:
         """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and a solution mask (N,)."""
-        with_roots = [k for k, step in enumerate(self.steps) if step.form is not None and step.form.has_two_roots]
+        with_roots = [
+            k
+            for k, step in enumerate(self.steps)
+            if step.form is not None and step.form.has_two_roots
+        ]
         for signs in product((1.0, -1.0), repeat=len(with_roots)):
             yield self._evaluate(T, dict(zip(with_roots, signs, strict=True)))
 
@@ -341,7 +357,9 @@ class InverseDerivation:
 
         for condition in self.conditions:
             distance = np.abs(values.of(condition.left) - values.of(condition.right))
-            is_solved &= np.broadcast_to(distance <= IN_PLANE * (self.description.reach or 1.0), count)
+            is_solved &= np.broadcast_to(
+                distance <= IN_PLANE * (self.description.reach or 1.0), count
+            )
         return values, is_solved
 
     def _joints(self, values: Values) -> Array:

@@ -71,7 +71,14 @@ def family_of(chain: ExactChain) -> Derivable | None:
 
 
 FAMILIES = (
-    Derivable("elbow_wrist", ("RRRRRR",), "spherical wrist, axes 2 and 3 parallel", elbow_fits, elbow, True),
+    Derivable(
+        "elbow_wrist",
+        ("RRRRRR",),
+        "spherical wrist, axes 2 and 3 parallel",
+        elbow_fits,
+        elbow,
+        True,
+    ),
     Derivable(
         "slide_wrist",
         ("RRPRRR",),
@@ -88,9 +95,18 @@ FAMILIES = (
         three_parallel,
         True,
     ),
-    Derivable("yaw_three", ("RRRR",), "a turntable, axes 2, 3 and 4 parallel", turntable_fits, yaw_three),
+    Derivable(
+        "yaw_three", ("RRRR",), "a turntable, axes 2, 3 and 4 parallel", turntable_fits, yaw_three
+    ),
     Derivable("yaw_two", ("RRR",), "a turntable, axes 2 and 3 parallel", turntable_fits, yaw_two),
-    Derivable("pan_tilt", ("RR",), "pan and tilt: axes 1 and 2 at right angles", pan_tilt_fits, pan_tilt, aims=True),
+    Derivable(
+        "pan_tilt",
+        ("RR",),
+        "pan and tilt: axes 1 and 2 at right angles",
+        pan_tilt_fits,
+        pan_tilt,
+        aims=True,
+    ),
     Derivable("parallel_chain", _CHAINS, "parallel axes", chain_fits, parallel_chain),
     Derivable(
         "polar",

@@ -122,7 +122,8 @@ class Circle(Form):
 
     has_two_roots = True
     statement = (
-        "A cos x + B sin x = C holds for x = atan2(B, A) +- atan2(sqrt(A^2 + B^2 - C^2), C), and for no other angle"
+        "A cos x + B sin x = C holds for x = atan2(B, A) +- atan2(sqrt(A^2 + B^2 - C^2), C), "
+        "and for no other angle"
     )
     text = ("atan2(<B>, <A>) ± atan2(sqrt(<D>), <C>)",)
     latex = (r"\mathrm{atan2}(<B>,\, <A>) \pm \mathrm{atan2}\bigl(\sqrt{<D>},\, <C>\bigr)",)
@@ -179,7 +180,9 @@ class Line(Form):
     """X sin x = Y cos x."""
 
     has_two_roots = True
-    statement = "X sin x = Y cos x holds for x = atan2(Y, X) and x = atan2(-Y, -X), and for no other angle"
+    statement = (
+        "X sin x = Y cos x holds for x = atan2(Y, X) and x = atan2(-Y, -X), and for no other angle"
+    )
     text = ("atan2(<Y>, <X>)", "atan2(<mY>, <mX>)")
     latex = (r"\mathrm{atan2}(<Y>,\, <X>)", r"\mathrm{atan2}(<mY>,\, <mX>)")
     code = "atan2(<s>*<Y>, <s>*<X>)"
@@ -227,7 +230,10 @@ class Direction(Form):
     def equations(self) -> tuple[tuple[Element, Element], ...]:
         """The two equations."""
         k = self.letters["k"]
-        return (k * self.unknown.cosine, self.letters["X"]), (k * self.unknown.sine, self.letters["Y"])
+        return (k * self.unknown.cosine, self.letters["X"]), (
+            k * self.unknown.sine,
+            self.letters["Y"],
+        )
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the angle."""
@@ -241,7 +247,9 @@ class Direction(Form):
         k = ring.constant("k")
         c = ring.cosine(0)
         s = ring.sine(0)
-        return Proof(Direction.statement, _column([k * (k * c) - k * k * c, k * (k * s) - k * k * s]))
+        return Proof(
+            Direction.statement, _column([k * (k * c) - k * k * c, k * (k * s) - k * k * s])
+        )
 
 
 class Flip(Form):
@@ -262,7 +270,10 @@ class Flip(Form):
     def equations(self) -> tuple[tuple[Element, Element], ...]:
         """The two equations."""
         k = self.letters["k"]
-        return (k * self.unknown.cosine, self.letters["X"]), (k * self.unknown.sine, self.letters["Y"])
+        return (k * self.unknown.cosine, self.letters["X"]), (
+            k * self.unknown.sine,
+            self.letters["Y"],
+        )
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the angle."""
@@ -275,7 +286,10 @@ class Flip(Form):
         k = ring.constant("k")
         c = ring.cosine(0)
         s = ring.sine(0)
-        return Proof(Flip.statement, np.concatenate([_column([(k * c) * s - (k * s) * c]), _along(["X", "Y"])]))
+        return Proof(
+            Flip.statement,
+            np.concatenate([_column([(k * c) * s - (k * s) * c]), _along(["X", "Y"])]),
+        )
 
 
 class CosineAndSquare(Form):
@@ -349,7 +363,9 @@ class Turned(Form):
         x = u * c - v * s
         y = u * s + v * c
         size = u * u + v * v
-        return Proof(Turned.statement, _column([u * x + v * y - size * c, u * y - v * x - size * s]))
+        return Proof(
+            Turned.statement, _column([u * x + v * y - size * c, u * y - v * x - size * s])
+        )
 
 
 class Square(Form):

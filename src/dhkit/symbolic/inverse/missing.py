@@ -39,7 +39,9 @@ def _missing(chain: ExactChain) -> str:
     # A spherical wrist: axes 4, 5 and 6 at right angles in turn, through one point.
     found += [_angle(chain, i) for i in (4, 5) if not chain.alpha[i - 1][0].is_zero]
     apart = [i for i in (4, 5) if chain.a[i - 1]]
-    found += [f"axes {i} and {i + 1} miss each other by {_length(chain, chain.a[i - 1])}" for i in apart]
+    found += [
+        f"axes {i} and {i + 1} miss each other by {_length(chain, chain.a[i - 1])}" for i in apart
+    ]
     if chain.d[4]:
         found.append(f"axes 4 and 6 meet axis 5 {_length(chain, chain.d[4])} apart")
     return ", ".join(found) or "its links have no length where two axes are parallel"

@@ -99,7 +99,9 @@ def parallel_chain(bench: Workbench) -> None:
         _chain_rotation(bench, revolute, before, first @ second, end)
         cosine, sine = chain.named(("cphi", "sphi"))
         at_zero = first @ second
-        from_axis_c = rotation(chain.ring, 0, 1, (cosine, sine))[:2, :2] @ at_zero[:2, :2] @ origin(end)[:2]
+        from_axis_c = (
+            rotation(chain.ring, 0, 1, (cosine, sine))[:2, :2] @ at_zero[:2, :2] @ origin(end)[:2]
+        )
         x = x - from_axis_c[0]
         y = y - from_axis_c[1]
 
@@ -112,7 +114,9 @@ def parallel_chain(bench: Workbench) -> None:
         )
     )
     both = origin(first @ chain.joint(b) @ second)
-    reach_with_two_links(bench, (a, b), origin(first)[:2], both[:2], (x, y), who, ("left", "right"), side)
+    reach_with_two_links(
+        bench, (a, b), origin(first)[:2], both[:2], (x, y), who, ("left", "right"), side
+    )
 
     if has_three:
         # The part of phi that joints a and b make: the rotation of link b by them, less its rotation at zero angles.
@@ -140,7 +144,9 @@ def _chain_senses(chain: ExactChain, revolute: list[int]) -> list[tuple[int, int
     return senses
 
 
-def _chain_rotation(bench: Workbench, revolute: list[int], before: Elements, at_zero: Elements, end: Elements) -> None:
+def _chain_rotation(
+    bench: Workbench, revolute: list[int], before: Elements, at_zero: Elements, end: Elements
+) -> None:
     """Add the step for phi, the sum of three parallel joints' angles, from the tool's axis that is seen best.
 
     Parameters
@@ -159,7 +165,13 @@ def _chain_rotation(bench: Workbench, revolute: list[int], before: Elements, at_
     senses = _chain_senses(chain, revolute)
 
     # Rz(phi) is the rotation of the links by the joints, less their rotation at zero angles.
-    whole = chain.joint(a) @ _between(chain, a, b) @ chain.joint(b) @ _between(chain, b, c) @ chain.joint(c)
+    whole = (
+        chain.joint(a)
+        @ _between(chain, a, b)
+        @ chain.joint(b)
+        @ _between(chain, b, c)
+        @ chain.joint(c)
+    )
     by_phi = whole[:2, :2] @ at_zero[:2, :2].T
     phi = bench.phi(by_phi[0, 0], by_phi[1, 0], senses)
 
@@ -203,7 +215,9 @@ def polar(bench: Workbench) -> None:
     """Write the steps of a prismatic joint after a revolute one, at right angles to its axis."""
     chain = bench.chain
     definitions, (x, y) = bench.define_all(x=origin(bench.T)[0], y=origin(bench.T)[1])
-    bench.add(DerivationStep("The point in the plane", "The tool is at (x, y) from axis 1.", definitions))
+    bench.add(
+        DerivationStep("The point in the plane", "The tool is at (x, y) from axis 1.", definitions)
+    )
     vector = origin(chain.link(1) @ chain.joint(2) @ chain.last)
     reach_with_slide(bench, 1, vector[:2], (x, y), TOOL)
     arm = (chain.whole @ chain.last)[2, 3]

@@ -102,7 +102,8 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
             "points."
         )
         nothing = (
-            f"{who} is nearer to axis 1 than {missing}: the missing distance is {missing} - sqrt({px * px + py * py})"
+            f"{who} is nearer to axis 1 than {missing}: "
+            f"the missing distance is {missing} - sqrt({px * px + py * py})"
         )
 
     # A branch has its name from the sense in which the arm points at the point. For the name, an offset that is only
@@ -218,7 +219,9 @@ def turn_into_place(
     )
 
 
-def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[Element, Element], who: str) -> None:
+def reach_with_slide(
+    bench: Workbench, i: int, vector: Elements, place: tuple[Element, Element], who: str
+) -> None:
     """Add the steps for a prismatic joint after a revolute joint i, from 1, that put a point in place.
 
     Parameters
@@ -242,7 +245,9 @@ def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[El
 
     # rest - M^2 is the squared distance of axis i from the line on which the point slides.
     passes_axis = (rest - M * M).is_zero
-    nothing = "" if passes_axis else f"{who} is nearer to axis {i} than the line along which it slides"
+    nothing = (
+        "" if passes_axis else f"{who} is nearer to axis {i} than the line along which it slides"
+    )
     bench.add(
         DerivationStep(
             f"q{i + 1}",
@@ -259,7 +264,9 @@ def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[El
     turn_into_place(bench, i, definitions, (u, v), place, who)
 
 
-def remaining_angle(bench: Workbench, i: int, before: Elements, senses: Sequence[tuple[int, int]], look: str) -> None:
+def remaining_angle(
+    bench: Workbench, i: int, before: Elements, senses: Sequence[tuple[int, int]], look: str
+) -> None:
     """Add the step for joint i, from 1, whose angle is the rest of the sum phi.
 
     Parameters
@@ -278,7 +285,9 @@ def remaining_angle(bench: Workbench, i: int, before: Elements, senses: Sequence
     Y = own * (sine * c - cosine * s)
     known_joints = [(f"theta{j}", -own * sense) for j, sense in senses[:-1]]
     terms = (("phi", own), *known_joints)
-    bench.add(DerivationStep(f"theta{i}", look, form=Remainder(bench.unknown(i), {"X": X, "Y": Y}, terms)))
+    bench.add(
+        DerivationStep(f"theta{i}", look, form=Remainder(bench.unknown(i), {"X": X, "Y": Y}, terms))
+    )
 
 
 def linear_parts(element: Element, i: int) -> tuple[Element, Element, Element]:
@@ -292,7 +301,9 @@ def linear_parts(element: Element, i: int) -> tuple[Element, Element, Element]:
     for monomial, coefficient in element.terms.items():
         if monomial[cosine] + monomial[sine] > 1:
             raise ValueError(f"not linear in cosine and sine of joint {i + 1}: {element}")
-        without = tuple(0 if k in (cosine, sine) else exponent for k, exponent in enumerate(monomial))
+        without = tuple(
+            0 if k in (cosine, sine) else exponent for k, exponent in enumerate(monomial)
+        )
         if monomial[cosine]:
             A[without] = coefficient
         elif monomial[sine]:
@@ -341,4 +352,6 @@ def height_of_slide(bench: Workbench, i: int, given: Element, arm: Element, look
     # given = sense q_i + rest, with sense 1 or -1
     sense = arm.terms[q_alone]
     rest = arm - sense * ring.position(i - 1)
-    bench.add(DerivationStep(f"q{i}", look, form=Sliding(bench.unknown(i), {"Z": sense * (given - rest)})))
+    bench.add(
+        DerivationStep(f"q{i}", look, form=Sliding(bench.unknown(i), {"Z": sense * (given - rest)}))
+    )

@@ -179,7 +179,10 @@ class Workbench:
 
         what = "base and tool" if self.undoes_tool else "base"
         after = f" and after joint {chain.n}" if self.undoes_tool else ""
-        definitions = [Definition(chain.names[name], entry) for name, entry in zip(INNER, _entries(given), strict=True)]
+        definitions = [
+            Definition(chain.names[name], entry)
+            for name, entry in zip(INNER, _entries(given), strict=True)
+        ]
         self.steps.append(
             DerivationStep(
                 f"The pose without {what}",
@@ -256,7 +259,9 @@ def _entries(T: Elements) -> list[Element]:
     return [*T[:3, 3], *T[:3, :3].flat]
 
 
-def without_unused(steps: Sequence[DerivationStep], further: Iterable[Element] = ()) -> list[DerivationStep]:
+def without_unused(
+    steps: Sequence[DerivationStep], further: Iterable[Element] = ()
+) -> list[DerivationStep]:
     """Return steps without the definitions that neither a later step nor a further element uses."""
     kept: list[DerivationStep] = []
     used = names_in(further)

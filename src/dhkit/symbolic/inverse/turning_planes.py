@@ -286,7 +286,12 @@ def yaw_three(bench: Workbench) -> None:
 
 
 def _known_rotation(
-    bench: Workbench, seen: Elements, own: Elements, sense: Element, senses: list[tuple[int, int]], column: int
+    bench: Workbench,
+    seen: Elements,
+    own: Elements,
+    sense: Element,
+    senses: list[tuple[int, int]],
+    column: int,
 ) -> None:
     """Add the step for phi from the direction of an axis of the tool.
 

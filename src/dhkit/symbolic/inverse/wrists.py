@@ -56,7 +56,9 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
     )
 
     # Axis 5 is (s4, -c4, 0), up to its sense, in link 3: components of n and o along it.
-    more, (nx, ny, ox, oy) = bench.define_all(nx=tool[0, 0], ny=tool[1, 0], ox=tool[0, 1], oy=tool[1, 1])
+    more, (nx, ny, ox, oy) = bench.define_all(
+        nx=tool[0, 0], ny=tool[1, 0], ox=tool[0, 1], oy=tool[1, 1]
+    )
     sign = s_alpha4 * s_alpha5
     c6_known = sign * (s4 * ox - c4 * oy)
     s6_known = sign * (s4 * nx - c4 * ny)
@@ -72,7 +74,9 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
     )
 
 
-def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definition, ...], Element, Element]:
+def turn_parallel_wrist(
+    bench: Workbench, sense: Element
+) -> tuple[tuple[Definition, ...], Element, Element]:
     """Add the steps for joints 5 and 6 after the parallel axes 2, 3 and 4.
 
     Parameters
@@ -118,7 +122,9 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definit
             "nz and oz are the components of the tool's x and y axes along axis 2: the direction of axis 2, seen from "
             "the tool.",
             definitions=more,
-            form=Direction(bench.unknown(6), {"k": s5, "X": sense * s_alpha4 * nz, "Y": -sense * s_alpha4 * oz}),
+            form=Direction(
+                bench.unknown(6), {"k": s5, "X": sense * s_alpha4 * nz, "Y": -sense * s_alpha4 * oz}
+            ),
         )
     )
 

@@ -30,7 +30,9 @@ def c_lines(statement: Statement, indent: str, shape: Sequence[int] = ()) -> lis
             line = wrapped(expression, f"{indent}const double {name} = ", f"{indent}    ") + ";"
             return [line + (f" /* {remark} */" if remark else "")]
         case Store(array, places, parts):
-            first, *others = [f"{array}[{_offset(place, shape)}]" if place else array for place in places]
+            first, *others = [
+                f"{array}[{_offset(place, shape)}]" if place else array for place in places
+            ]
             lines = []
             for k, part in enumerate(parts):
                 sign = "=" if k == 0 else "+="
@@ -60,12 +62,16 @@ NUMPY = Syntax(
     item="{array}[..., {k}]",
     first_index=0,
     pi="np.pi",
-    functions={name: f"np.{_NUMPY_NAMES.get(name, name)}" for name in (*_NUMPY_NAMES, "tan", "sqrt", "abs")},
+    functions={
+        name: f"np.{_NUMPY_NAMES.get(name, name)}" for name in (*_NUMPY_NAMES, "tan", "sqrt", "abs")
+    },
     nan="1e999 - 1e999",  # so that generated modules import nothing for it
     infinity="1e999",
 )
 """Expressions of arrays with leading batch axes."""
-PYTHON = Syntax(item="{array}[{k}]", first_index=0, pi="pi", functions={}, nan="nan", infinity="inf")
+PYTHON = Syntax(
+    item="{array}[{k}]", first_index=0, pi="pi", functions={}, nan="nan", infinity="inf"
+)
 """Expressions of numbers, with the functions of the standard library."""
 
 
@@ -75,9 +81,14 @@ def python_lines(statement: Statement, indent: str) -> list[str]:
         case Comment(text):
             return ["", *comment_block([text], f"{indent}# ", f"{indent}# ", "")]
         case Let(name, expression, remark):
-            return [_assigned(expression, f"{indent}{name} = ", indent) + (f"  # {remark}" if remark else "")]
+            return [
+                _assigned(expression, f"{indent}{name} = ", indent)
+                + (f"  # {remark}" if remark else "")
+            ]
         case Store(array, places, parts):
-            first, *others = [f"{array}[{', '.join(['...', *map(str, place)])}]" for place in places]
+            first, *others = [
+                f"{array}[{', '.join(['...', *map(str, place)])}]" for place in places
+            ]
             lines = []
             for k, part in enumerate(parts):
                 sign = "=" if k == 0 else "+="
@@ -103,7 +114,9 @@ def _assigned(expression: str, head: str, indent: str) -> str:
 
 # MATLAB, and GNU Octave
 
-MATLAB = Syntax(item="{array}({k})", first_index=1, pi="pi", functions={}, nan="NaN", infinity="Inf")
+MATLAB = Syntax(
+    item="{array}({k})", first_index=1, pi="pi", functions={}, nan="NaN", infinity="Inf"
+)
 
 
 def matlab_lines(statement: Statement, indent: str) -> list[str]:
@@ -125,7 +138,10 @@ def matlab_lines(statement: Statement, indent: str) -> list[str]:
                     sum_so_far = f"{first} "
                 else:
                     sum_so_far = f"{first} + "
-                lines.append(wrapped(part, f"{indent}{first} = {sum_so_far}", f"{indent}    ", ending=" ...") + ";")
+                lines.append(
+                    wrapped(part, f"{indent}{first} = {sum_so_far}", f"{indent}    ", ending=" ...")
+                    + ";"
+                )
             return [*lines, *(f"{indent}{other} = {first};" for other in others)]
         case Guard(expression, least):
             return [f"{indent}if {expression} < {least}", f"{indent}    continue", f"{indent}end"]

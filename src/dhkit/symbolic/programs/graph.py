@@ -77,7 +77,16 @@ _SIGNED = {"add", "subtract", "multiply", "divide", "negate"}
 """Operations from which a negative sign can be taken out."""
 _LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
 """Operations whose result a constant condition may decide."""
-_COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
+_COMMUTATIVE = {
+    "add",
+    "multiply",
+    "minimum",
+    "maximum",
+    "equal",
+    "unequal",
+    "logical_and",
+    "logical_or",
+}
 """Operations with f(x, y) = f(y, x), which are merged in either order of their arguments."""
 
 
@@ -177,8 +186,12 @@ class Graph:
         nodes, results = _pruned(builder.nodes, results)
         return cls(
             name,
-            inputs=tuple(Variable(key, shapes.get(key, tuple(x.shape))) for key, x in inputs.items()),
-            outputs=tuple(Variable(key, shapes.get(key, tuple(y.shape))) for key, y in outputs.items()),
+            inputs=tuple(
+                Variable(key, shapes.get(key, tuple(x.shape))) for key, x in inputs.items()
+            ),
+            outputs=tuple(
+                Variable(key, shapes.get(key, tuple(y.shape))) for key, y in outputs.items()
+            ),
             nodes=nodes,
             results=results,
         )
@@ -232,7 +245,9 @@ class _Builder:
             elif code in operations:
                 work[into[0]] = self.apply(operations[code], [work[source] for source in sources])
             else:
-                raise ValueError(f"operation {code} of CasADi is not one of a straight-line program")
+                raise ValueError(
+                    f"operation {code} of CasADi is not one of a straight-line program"
+                )
         return outputs
 
     def apply(self, operation: str, arguments: Sequence[int]) -> int:
@@ -351,7 +366,11 @@ class _Builder:
 
     def add(self, node: Node) -> int:
         """Return the number of a node, which is appended unless an equal one is there."""
-        key = (node.operation, node.arguments, repr(node.value))  # NaN differs from itself; as text all NaN are equal
+        key = (
+            node.operation,
+            node.arguments,
+            repr(node.value),
+        )  # NaN differs from itself; as text all NaN are equal
         if key not in self._places:
             self._places[key] = len(self.nodes)
             self.nodes.append(node)
@@ -397,6 +416,8 @@ def operation_count(graph: Graph) -> dict[str, int]:
     >>> operation_count(Graph.of("line", {"x": x}, {"y": 3 * casadi.sin(x) - 1}))
     {'additions': 1, 'multiplications': 1, 'sines and cosines': 1}
     """
-    operations = [node.operation for node in graph.nodes if node.operation not in ("input", "constant")]
+    operations = [
+        node.operation for node in graph.nodes if node.operation not in ("input", "constant")
+    ]
     counts = Counter(_COUNTED_AS.get(operation, "others") for operation in operations)
     return dict(sorted(counts.items()))

@@ -47,7 +47,9 @@ def c_source(graph: Graph) -> str:
     return "\n".join([*lines, "}"]) + "\n"
 
 
-def export_c(graphs: Sequence[Graph], folder: str | Path, name: str, remark: str = "") -> tuple[Path, Path]:
+def export_c(
+    graphs: Sequence[Graph], folder: str | Path, name: str, remark: str = ""
+) -> tuple[Path, Path]:
     """Write programs as ``NAME.c`` and ``NAME.h``, self-contained C99 (link with -lm); return both paths.
 
     Parameters

@@ -58,8 +58,12 @@ class Constants:
                 self._scan_atom(atom)
                 if exponent < 0:
                     # A group is a sum in parentheses.
-                    denominator = atom.arguments[0] if atom.name == "group" else Expression.of_atom(atom)
-                    self._add(Constant(reciprocal_text(atom), 1 / denominator, reciprocal_of=denominator))
+                    denominator = (
+                        atom.arguments[0] if atom.name == "group" else Expression.of_atom(atom)
+                    )
+                    self._add(
+                        Constant(reciprocal_text(atom), 1 / denominator, reciprocal_of=denominator)
+                    )
 
     def _scan_atom(self, atom: Atom) -> None:
         """Add the constants of a name, a sum in parentheses or a function of an expression."""
@@ -74,7 +78,9 @@ class Constants:
             self._scan(inside)
             self._add(Constant(atom.text, Expression.of_atom(atom), square=inside))
         elif atom.text not in self.found:
-            self.notes.append(f"{atom.text} is a symbol of its own: identities with it are not seen")
+            self.notes.append(
+                f"{atom.text} is a symbol of its own: identities with it are not seen"
+            )
             self._add(Constant(atom.text, Expression.of_atom(atom)))
 
     def _scan_angle(self, angle: Expression) -> None:
@@ -102,7 +108,9 @@ class Constants:
             self._add(Constant(cosine.text, cosine))
             self._add(Constant(sine.text, sine, square=1 - cosine * cosine))
             if not unit_angle.symbols:
-                self.notes.append(f"{cosine} and {sine} are symbols, related by {cosine}^2 + {sine}^2 = 1")
+                self.notes.append(
+                    f"{cosine} and {sine} are symbols, related by {cosine}^2 + {sine}^2 = 1"
+                )
 
     def _add(self, constant: Constant) -> None:
         self.found.setdefault(constant.text, constant)
@@ -118,7 +126,9 @@ def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
         return math.nan
 
 
-def _common_angles(expressions: Iterable[Expression], angles: Iterable[Expression]) -> dict[Monomial, Fraction]:
+def _common_angles(
+    expressions: Iterable[Expression], angles: Iterable[Expression]
+) -> dict[Monomial, Fraction]:
     """Return, for each monomial in angles, the largest rational u of which all its coefficients are whole multiples.
 
     For pi/7 and 3*pi/14, u is 1/14 at the monomial pi.

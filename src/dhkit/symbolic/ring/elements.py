@@ -98,10 +98,14 @@ class Element:
         if len(factor) == 0:
             return Element(self.ring, factor)
         if len(self.polynomial) * len(factor) > BOUNDS.pairs:
-            raise RingError(f"a product of {len(self.polynomial)} by {len(factor)} terms: {_TOO_LONG}")
+            raise RingError(
+                f"a product of {len(self.polynomial)} by {len(factor)} terms: {_TOO_LONG}"
+            )
         product = Element(self.ring, self.polynomial * factor).reduced()
         if len(product.polynomial) > BOUNDS.terms:
-            raise RingError(f"an expression of {len(product.polynomial)} terms, beyond {BOUNDS.terms}: {_TOO_LONG}")
+            raise RingError(
+                f"an expression of {len(product.polynomial)} terms, beyond {BOUNDS.terms}: {_TOO_LONG}"
+            )
         return product
 
     __rmul__ = __mul__
@@ -115,7 +119,9 @@ class Element:
     def _coerced(self, other: _Scalar) -> Any:
         if isinstance(other, Element):
             if other.ring != self.ring:
-                raise RingError("elements of two rings; derive both from one description and with equal symbols")
+                raise RingError(
+                    "elements of two rings; derive both from one description and with equal symbols"
+                )
             return other.polynomial
         return self.ring.polynomials.constant(_rational(other))
 
@@ -126,7 +132,9 @@ class Element:
 
     def reduced(self) -> Element:
         """Return the normal form under the ring's relations."""
-        return Element(self.ring, self.ring.polynomials.reduced(self.polynomial, self.ring.relations))
+        return Element(
+            self.ring, self.ring.polynomials.reduced(self.polynomial, self.ring.relations)
+        )
 
     # Comparing
 
@@ -240,7 +248,9 @@ class Element:
 
     def by_rate(self, i: int) -> Element:
         """Return the partial derivative by joint i's rate."""
-        return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, self.ring.place("rate", i)))
+        return Element(
+            self.ring, self.ring.polynomials.derivative(self.polynomial, self.ring.place("rate", i))
+        )
 
     def by_constant(self, text: str) -> Element:
         """Return the partial derivative by a constant that no other constant depends on."""
@@ -310,7 +320,9 @@ class PolynomialRing(ABC):
             The ring has no constant of that text.
         """
         if ("constant", text) not in self._places:
-            raise RingError(f"no {text!r} in the ring; it has {', '.join(self.constants) or 'no constants'}")
+            raise RingError(
+                f"no {text!r} in the ring; it has {', '.join(self.constants) or 'no constants'}"
+            )
         return self._element(("constant", text))
 
     def sine(self, i: int) -> Element:
@@ -348,7 +360,11 @@ class PolynomialRing(ABC):
     def turning(self) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
         """Indices of each angle's sine and cosine among the generators, and the joints whose variables add up to it."""
         cosine_of = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
-        return tuple((k, cosine_of[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
+        return tuple(
+            (k, cosine_of[g.joints], g.joints)
+            for k, g in enumerate(self.generators)
+            if g.kind == "sine"
+        )
 
     @property
     def n(self) -> int:

@@ -140,5 +140,9 @@ def constants_of(generators: Iterable[Generator]) -> list[Generator]:
 def angles_of(generators: Iterable[Generator]) -> list[SineOrCosine]:
     """Return the sines and cosines among generators: of single joints, then of sums; the cosine before the sine."""
     # A set, since generators of different rings may have the same name. Only sines and cosines have joints.
-    found = {SineOrCosine(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints}
+    found = {
+        SineOrCosine(g.text, "sin" if g.kind == "sine" else "cos", g.joints)
+        for g in generators
+        if g.joints
+    }
     return sorted(found, key=lambda angle: (len(angle.joints) > 1, angle.joints, angle.function))

@@ -84,10 +84,15 @@ class _Flint:
         return self._generators[k]
 
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Any:
-        return self._ring.from_dict({m: self._number(c.numerator, c.denominator) for m, c in terms.items()})
+        return self._ring.from_dict(
+            {m: self._number(c.numerator, c.denominator) for m, c in terms.items()}
+        )
 
     def terms(self, polynomial: Any) -> Mapping[Monomial, Any]:
-        return {tuple(map(int, monomial)): Fraction(int(c.p), int(c.q)) for monomial, c in polynomial.to_dict().items()}
+        return {
+            tuple(map(int, monomial)): Fraction(int(c.p), int(c.q))
+            for monomial, c in polynomial.to_dict().items()
+        }
 
     def derivative(self, polynomial: Any, k: int) -> Any:
         return polynomial.derivative(k)
@@ -130,10 +135,15 @@ class _Sympy:
         return self._ring.gens[k]
 
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Any:
-        return self._ring.from_dict({m: self._number(int(c.numerator), int(c.denominator)) for m, c in terms.items()})
+        return self._ring.from_dict(
+            {m: self._number(int(c.numerator), int(c.denominator)) for m, c in terms.items()}
+        )
 
     def terms(self, polynomial: Any) -> Mapping[Monomial, Any]:
-        return {monomial: Fraction(int(c.numerator), int(c.denominator)) for monomial, c in polynomial.items()}
+        return {
+            monomial: Fraction(int(c.numerator), int(c.denominator))
+            for monomial, c in polynomial.items()
+        }
 
     def derivative(self, polynomial: Any, k: int) -> Any:
         return polynomial.diff(k)

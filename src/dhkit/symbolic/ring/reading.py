@@ -70,7 +70,9 @@ class ExpressionReader:
 
     def _multiple(self, monomial: Monomial, coefficient: Fraction) -> Direction:
         """Return cosine and sine of a whole multiple of an angle whose cosine and sine are constants."""
-        units = [unit for unit in self.units.get(monomial, ()) if (coefficient / unit).denominator == 1]
+        units = [
+            unit for unit in self.units.get(monomial, ()) if (coefficient / unit).denominator == 1
+        ]
         unit = max(units, default=abs(coefficient))
         angle = Expression(((monomial, unit),))
         cosine = self.ring.constant(f"cos({angle.text})")

@@ -19,7 +19,12 @@ from dhkit.expressions import Expression
 from dhkit.expressions.exact import Monomial as TermMonomial
 from dhkit.symbolic.ring.elements import Element, Generator, PolynomialRing
 from dhkit.symbolic.ring.polynomials import Monomial, Relation, polynomials
-from dhkit.symbolic.ring.reading import Direction, ExpressionReader, difference_of_angles, sum_of_angles
+from dhkit.symbolic.ring.reading import (
+    Direction,
+    ExpressionReader,
+    difference_of_angles,
+    sum_of_angles,
+)
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,11 @@ class Ring(PolynomialRing):
     def _relate_reciprocal(self, key: tuple[str, int | str], denominator: Element) -> None:
         """Add the relation x * denominator - 1 = 0 for the generator x with this key."""
         x = self._element(key).polynomial
-        self._add_relation(Relation(self._places[key], 1, x * denominator.polynomial - self.polynomials.constant(1)))
+        self._add_relation(
+            Relation(
+                self._places[key], 1, x * denominator.polynomial - self.polynomials.constant(1)
+            )
+        )
 
     def _add_relation(self, relation: Relation) -> None:
         relations = [*self.relations, relation]
@@ -213,7 +222,9 @@ class Ring(PolynomialRing):
         return units
 
 
-def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int, Element]) -> Element:
+def translated(
+    element: Element, ring: PolynomialRing, replacements: Mapping[int, Element]
+) -> Element:
     """Return an element in another ring.
 
     Parameters
@@ -242,7 +253,9 @@ def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int
                 moved[targets[k]] = monomial[k]
         parts.setdefault(replaced, {})[tuple(moved)] = coefficient
 
-    powers: dict[tuple[int, int], Element] = {}  # powers of replacements so far, by index and exponent
+    powers: dict[
+        tuple[int, int], Element
+    ] = {}  # powers of replacements so far, by index and exponent
     total = []
     for exponents, group in parts.items():
         product = ring.one

@@ -204,6 +204,11 @@ class Page {
     this.stage.showOverlays(visible);
   }
 
+  showPerson(visible) {
+    element("person").setAttribute("aria-pressed", String(visible));
+    this.stage.showPerson(visible);
+  }
+
   tick(now) {
     requestAnimationFrame((next) => this.tick(next));
     this.player.tick(now);
@@ -220,10 +225,12 @@ class Page {
     const frames = () => this.showFrames(flip("frames"));
     const trace = () => this.showTraces(flip("trace"));
     const overlays = () => this.showOverlays(flip("overlays"));
+    const person = () => this.showPerson(flip("person"));
     const reset = () => this.stage.resetCamera();
     element("frames").addEventListener("click", frames);
     element("trace").addEventListener("click", trace);
     element("overlays").addEventListener("click", overlays);
+    element("person").addEventListener("click", person);
     element("reset").addEventListener("click", reset);
     element("readout").addEventListener("toggle", () => this.stage.refit());
     const { player } = this;
@@ -231,6 +238,7 @@ class Page {
       f: frames,
       t: trace,
       o: () => !element("overlays").hidden && overlays(),
+      p: person,
       r: reset,
       l: () => player.active && player.repeat(!player.loop),
       " ": () => player.active && player.toggle(),
@@ -263,7 +271,7 @@ function insets() {
     top = 60,
     bottom = element("player").hidden ? 14 : 66;
   const readout = element("card") ?? element("readout"),
-    beside = readout.open && !readout.hidden && innerWidth > (readout.id === "card" ? 1100 : 560);
+    beside = readout.open && !readout.hidden && innerWidth > Number(readout.dataset.room);
   const { left } = element("stage").getBoundingClientRect();
   return { left: beside ? readout.getBoundingClientRect().right - left : 12, top, right, bottom };
 }

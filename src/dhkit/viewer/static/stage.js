@@ -6,6 +6,7 @@ import { Labels } from "./labels.js";
 import { placements } from "./messages.js";
 import { Outlines } from "./outlines.js";
 import { Overlays } from "./overlays.js";
+import { HEIGHT, person } from "./person.js";
 import { Quality, drawnInSoftware } from "./quality.js";
 import { smoothNormals } from "./smooth.js";
 import { Trace, Trail } from "./trace.js";
@@ -19,6 +20,9 @@ const GREY = [148, 156, 168]; // of ghosts
 const REST = 400; // ms without a change after which the picture is drawn finely
 const FINEST = 2; // pixels of the picture for one of the page
 const TRACE_RADIUS = 0.0035; // share of the arm's size
+const BESIDE = 0.5; // from the base to the person, share of the arm's size
+const BESIDE_MARGIN = 0.3; // m, added to it
+const SHOULDER = 0.3; // half of a person's width, m
 const POINT = 0.008; // diameter of a point, share of the arm's size
 const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/scene.py
 
@@ -188,6 +192,7 @@ export class Stage {
     this.trail.begin(about.size);
     this.up = new THREE.Vector3(...about.up);
     this.takeParts(about.labels);
+    this.placePerson();
     this.setUp();
     this.color();
   }
@@ -284,6 +289,7 @@ export class Stage {
     this.placement = placement;
     this.seen.union(this.boxOf(placement));
     this.overlays.growBox(this.seen, this.steady);
+    if (this.person?.visible) this.seen.union(this.personBox);
     if (this.held || this.touched || this.framed.containsBox(this.seen)) return;
     this.frame(this.seen);
   }
@@ -409,6 +415,31 @@ export class Stage {
     this.framesShown = visible;
     if (!this.touched) this.reframe();
     this.dirty();
+  }
+
+  // Show a person beside the arm, for size: to the right of it, as one looks at it first.
+  showPerson(visible) {
+    if (!this.person) {
+      this.person = person(THREE);
+      this.viewer.scene.add(this.person);
+    }
+    this.person.visible = visible;
+    this.placePerson();
+    if (!this.touched) this.reframe();
+    this.dirty();
+  }
+
+  placePerson() {
+    if (!this.person) return;
+    const up = this.up.clone();
+    const right = new THREE.Vector3().crossVectors(up, this.direction(this.seen)).normalize();
+    const back = new THREE.Vector3().crossVectors(up, right);
+    const axes = new THREE.Matrix4().makeBasis(right, back, up);
+    this.person.quaternion.setFromRotationMatrix(axes);
+    this.person.position.copy(right).multiplyScalar(BESIDE_MARGIN + BESIDE * this.size);
+    const feet = this.person.position.clone();
+    const head = feet.clone().addScaledVector(up, HEIGHT);
+    this.personBox = new THREE.Box3().setFromPoints([feet, head]).expandByScalar(SHOULDER);
   }
 
   // A frame on its way from one pose to another, 16 numbers by row each; null takes it away.

@@ -77,7 +77,10 @@ GOING_ON = [
 @pytest.mark.parametrize("text", GOING_ON)
 def test_rows_that_go_on_are_one_formula(read, text):
     sheet = read(text.replace("A", "m_1 g").replace("B", "m_2 g"))
-    assert squeezed(sheet.answers["V"]) in ("m_1g+m_2g", r"\begin{aligned}[t]&m_1g\\&+m_2g\end{aligned}")
+    assert squeezed(sheet.answers["V"]) in (
+        "m_1g+m_2g",
+        r"\begin{aligned}[t]&m_1g\\&+m_2g\end{aligned}",
+    )
 
 
 @pytest.mark.parametrize(
@@ -105,7 +108,9 @@ def test_a_second_row_counts(graded):
 
 @pytest.mark.parametrize("sign", ["=", r"\equiv", r"\approx"])
 def test_a_chain_states_each_of_its_formulas(read, graded, sign):
-    assert read(rf"\begin{{align}} V &= A \\ &{sign} B \end{{align}}").answers["V"] == EqualFormulas(("A", "B"))
+    assert read(rf"\begin{{align}} V &= A \\ &{sign} B \end{{align}}").answers[
+        "V"
+    ] == EqualFormulas(("A", "B"))
     wrong = V.replace("s_1", "c_1")
     assert graded(rf"\begin{{align}} V &= {V} \\ &{sign} {V} + 0 \end{{align}}")
     for first, second in ((V, wrong), (wrong, V), (wrong, wrong)):
@@ -115,7 +120,9 @@ def test_a_chain_states_each_of_its_formulas(read, graded, sign):
         ):
             report = graded(text)
             assert bool(report) is (second == V)
-            assert first == second or any(note.kind is NoteKind.SIDES_DIFFER for note in report.notes)
+            assert first == second or any(
+                note.kind is NoteKind.SIDES_DIFFER for note in report.notes
+            )
 
 
 @pytest.mark.parametrize(
@@ -164,8 +171,28 @@ def test_names_on_several_sides_name_entries(read, text):
             r"V_{\text{link 1}}",
             "2V",
         ),
-        *("-V", "V + K", r"\nabla V", "V(0)", "V(q_1 = 0)", r"\max V", "V^2", r"\int V", r"\langle V \rangle", "V dt"),
-        *(r"\mathrm{d}V", "dV", r"V^\star", r"V_{,1}", r"\lvert V \rvert", "V T", r"\sum V", r"\frac{dV}{dt}"),
+        *(
+            "-V",
+            "V + K",
+            r"\nabla V",
+            "V(0)",
+            "V(q_1 = 0)",
+            r"\max V",
+            "V^2",
+            r"\int V",
+            r"\langle V \rangle",
+            "V dt",
+        ),
+        *(
+            r"\mathrm{d}V",
+            "dV",
+            r"V^\star",
+            r"V_{,1}",
+            r"\lvert V \rvert",
+            "V T",
+            r"\sum V",
+            r"\frac{dV}{dt}",
+        ),
     ],
 )
 def test_what_is_not_V_is_not_read_as_V(read, left):
@@ -280,7 +307,20 @@ def test_what_changes_nothing_changes_no_verdict(graded, text):
         (r"g_2(q_1, q_2)", "g2"),
         (r"M(1,2)", "M12"),
         (r"{\bf M}", "M"),
-        *((side, "") for side in (r"\dot V", "V'", "M^{-1}", "2M", "V + K", r"\frac{V}{2}", "", "V(q_1 + q_2)", "1")),
+        *(
+            (side, "")
+            for side in (
+                r"\dot V",
+                "V'",
+                "M^{-1}",
+                "2M",
+                "V + K",
+                r"\frac{V}{2}",
+                "",
+                "V(q_1 + q_2)",
+                "1",
+            )
+        ),
     ],
 )
 def test_left_hand_sides(side, name):
@@ -309,7 +349,9 @@ def test_statements_of_one_entry(text, targets, formulas):
     assert (statement.targets, statement.formulas, statement.problem) == (targets, formulas, "")
 
 
-@pytest.mark.parametrize("text", ["V = a\n  + b", "V = a +\n b", "V = (a\n + b)", "V = a ...\n + b;", "V\n= a + b"])
+@pytest.mark.parametrize(
+    "text", ["V = a\n  + b", "V = a +\n b", "V = (a\n + b)", "V = a ...\n + b;", "V\n= a + b"]
+)
 def test_lines_of_plain_text_that_go_on(text):
     (statement,) = statements_of(text, ".txt")
     assert [squeezed(formula).strip("()") for formula in statement.formulas] == ["a+b"]
@@ -320,7 +362,10 @@ def test_a_system_gives_several_statements():
     found = statements_of(r"\begin{cases} \tau_1 = a \\ \tau_2 = b \end{cases}")
     assert [(s.targets, s.formulas) for s in found] == [(("tau1",), ("a",)), (("tau2",), ("b",))]
     found = statements_of("g1 = a\ng2 = b;\n")
-    assert [(s.line, s.targets, s.formulas) for s in found] == [(1, ("g1",), ("a",)), (2, ("g2",), ("b",))]
+    assert [(s.line, s.targets, s.formulas) for s in found] == [
+        (1, ("g1",), ("a",)),
+        (2, ("g2",), ("b",)),
+    ]
 
 
 # Found by adversaries: what stands after comments, words, macros and & counts, or refuses
@@ -372,7 +417,9 @@ def test_a_row_that_begins_with_a_relation_goes_on(read, graded, rows):
     assert [squeezed(formula) for formula in answer.formulas] == ["m_1g", "m_2g"]
 
 
-@pytest.mark.parametrize(("first", "second", "verdict"), [(M22, LESS, "wrong"), (LESS, M22, "correct")])
+@pytest.mark.parametrize(
+    ("first", "second", "verdict"), [(M22, LESS, "wrong"), (LESS, M22, "correct")]
+)
 def test_the_last_side_is_judged(graded, first, second, verdict):
     text = rf"\begin{{align}} M_{{22}} = &{first} \\ = &{second} \end{{align}}"
     assert verdict in [entry.verdict.value for entry in graded(text).entries]
@@ -393,10 +440,31 @@ def test_a_row_that_may_go_on_with_two_equations(read, text):
 @pytest.mark.parametrize(
     "behind",
     [
-        *(r"\text{ + 3} l_1", r"\text{ times } 2", r"\text{ minus } \theta_1", r"\mbox{$+ \theta_1$}"),
-        *(r"\text{$+\theta_1$}", r"\quad\text{if } m_1>3", r"\text{ plus three}", r"\textrm{ and also } + l_1"),
-        *(r"\text{, that is } = 3", r"\Rightarrow 3", r"\text{ (when folded)}", r"\text{ plus}", r"\text{ - 2}"),
-        *(r"\quad \text{(2 of 3)}", r"\text{ for } q_2 > 0", r"\text{ words } \\ l_1", r", \\ 2 l_1"),
+        *(
+            r"\text{ + 3} l_1",
+            r"\text{ times } 2",
+            r"\text{ minus } \theta_1",
+            r"\mbox{$+ \theta_1$}",
+        ),
+        *(
+            r"\text{$+\theta_1$}",
+            r"\quad\text{if } m_1>3",
+            r"\text{ plus three}",
+            r"\textrm{ and also } + l_1",
+        ),
+        *(
+            r"\text{, that is } = 3",
+            r"\Rightarrow 3",
+            r"\text{ (when folded)}",
+            r"\text{ plus}",
+            r"\text{ - 2}",
+        ),
+        *(
+            r"\quad \text{(2 of 3)}",
+            r"\text{ for } q_2 > 0",
+            r"\text{ words } \\ l_1",
+            r", \\ 2 l_1",
+        ),
     ],
 )
 def test_words_that_may_change_a_formula_refuse_it(read, behind):
@@ -413,7 +481,12 @@ def test_words_in_front_of_a_formula_part_no_product(read):
 @pytest.mark.parametrize(
     "behind",
     [
-        *(r"\text{ (potential energy)}", r"\quad\text{where } x = 3", r", \quad \text{with } m_1 > 0", r"\text{.}"),
+        *(
+            r"\text{ (potential energy)}",
+            r"\quad\text{where } x = 3",
+            r", \quad \text{with } m_1 > 0",
+            r"\text{.}",
+        ),
         *(
             r"\text{ and } a = 2",
             r"\quad \text{(left-hand side).}",
@@ -433,9 +506,9 @@ def test_a_value_of_a_joint_behind_a_formula_is_listed(read):
     assert sheet.left_out == (r"line 1: \theta_1 = 3",)
 
 
-GRAVITY_ROWS = r"\begin{bmatrix} A \\ B \end{bmatrix}".replace("A", f"{GRAVITY[0]} + {GRAVITY[1]}").replace(
-    "B", r"\tfrac12 m_2 g l_2 c_{12}"
-)
+GRAVITY_ROWS = r"\begin{bmatrix} A \\ B \end{bmatrix}".replace(
+    "A", f"{GRAVITY[0]} + {GRAVITY[1]}"
+).replace("B", r"\tfrac12 m_2 g l_2 c_{12}")
 
 
 @pytest.mark.parametrize(
@@ -491,7 +564,9 @@ def test_what_may_change_any_sign_refuses_the_file(read, text):
         read(f"\n{text} \\[ V = {V} \\]")
 
 
-@pytest.mark.parametrize("text", [r"\renewcommand{\phi}{\varphi}", r"\newcommand{\R}{\mathbb{R}}", r"\makeatletter"])
+@pytest.mark.parametrize(
+    "text", [r"\renewcommand{\phi}{\varphi}", r"\newcommand{\R}{\mathbb{R}}", r"\makeatletter"]
+)
 def test_harmless_definitions(graded, text):
     assert graded(rf"{text} \[ V = {V} \]").entries[0].verdict.value == "correct"
 
@@ -524,7 +599,12 @@ def test_a_mark_for_the_other_half(graded, mark):
         assert [entry.verdict.value for entry in report.entries] == ["correct"] * 4
     wrong = f"{M11} & {M22} \\\\ {mark} & {M22}"
     report = graded(rf"\[ M(q) = \begin{{bmatrix}} {wrong} \end{{bmatrix}} \]")
-    assert [entry.verdict.value for entry in report.entries] == ["correct", "wrong", "wrong", "correct"]
+    assert [entry.verdict.value for entry in report.entries] == [
+        "correct",
+        "wrong",
+        "wrong",
+        "correct",
+    ]
 
 
 @pytest.mark.parametrize("rows", [r"* & * \\ * & 1", r"1 & * \\ * & 2", r"* & 1 \\ 1 & 2"])

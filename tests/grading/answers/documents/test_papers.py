@@ -153,7 +153,9 @@ V &=& \textstyle\frac{1}{2} m_1 \, g \, l_1 \, \mathrm{sin}(\th{1}) \nonumber \\
     ),
 }
 """Displays of a paper about planar2r, with the verdict and the quantities that they give."""
-DOCUMENT = r"\documentclass{article}\usepackage{amsmath}\begin{document}Let $x = 3$.%s\end{document}"
+DOCUMENT = (
+    r"\documentclass{article}\usepackage{amsmath}\begin{document}Let $x = 3$.%s\end{document}"
+)
 
 
 @pytest.mark.parametrize("name", PAPERS)
@@ -162,7 +164,10 @@ def test_equations_of_papers(name, tmp_path):
     path = tmp_path / "paper.tex"
     path.write_text(DOCUMENT % display)
     if verdict == "unreadable":
-        with pytest.raises(AnswerError, match=r"the macro .*is not read; write it out in one formula, or on a sheet$"):
+        with pytest.raises(
+            AnswerError,
+            match=r"the macro .*is not read; write it out in one formula, or on a sheet$",
+        ):
             grade(path, library_robot("planar2r"))
         return
     report = grade(path, library_robot("planar2r"), explain=False)
@@ -170,7 +175,9 @@ def test_equations_of_papers(name, tmp_path):
     assert not report.left_out
 
 
-@pytest.mark.parametrize("name", [name for name, (verdict, *_) in PAPERS.items() if verdict == "correct"])
+@pytest.mark.parametrize(
+    "name", [name for name, (verdict, *_) in PAPERS.items() if verdict == "correct"]
+)
 def test_a_changed_sign_is_found(name, tmp_path):
     display = PAPERS[name][2]
     changed = display.replace("+", "-", 1) if "+" in display else display.replace("-", "", 1)

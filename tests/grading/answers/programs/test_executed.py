@@ -62,7 +62,9 @@ def judged(tmp_path):
 
 def verdicts(report):
     return {
-        quantity: max((entry.verdict for entry in report.of(quantity)), key=lambda one: one.severity)
+        quantity: max(
+            (entry.verdict for entry in report.of(quantity)), key=lambda one: one.severity
+        )
         for quantity in report.quantities
     }
 
@@ -82,7 +84,9 @@ def test_a_mistake_is_found_and_named(judged):
 
 
 def test_names_without_a_value_are_symbols(judged):
-    assert verdicts(judged(f"from numpy import cos, array\nM = array({M})")) == {"M": Verdict.CORRECT}
+    assert verdicts(judged(f"from numpy import cos, array\nM = array({M})")) == {
+        "M": Verdict.CORRECT
+    }
 
 
 RIGHT_PROGRAMS = [
@@ -101,7 +105,9 @@ RIGHT_PROGRAMS = [
 ]
 
 
-@pytest.mark.parametrize("text", [slow_if(k % 4 > 0, text) for k, text in enumerate(RIGHT_PROGRAMS)])
+@pytest.mark.parametrize(
+    "text", [slow_if(k % 4 > 0, text) for k, text in enumerate(RIGHT_PROGRAMS)]
+)
 def test_programs_that_are_right_are_proved(judged, text):
     report = judged(text)
     assert verdicts(report) == {"M": Verdict.CORRECT}, report
@@ -146,11 +152,15 @@ def test_local_names_of_a_right_hand_side_are_sampled(judged, tmp_path):
 @pytest.mark.slow
 def test_sampled_parameters_vary(judged):
     """A function that has a parameter's value instead of its letter is right at the file's values alone."""
-    text = "def V(q1, q2, m1, m2, l1, l2, g):\n    from math import sin\n    float(q1)\n    return {}"
+    text = (
+        "def V(q1, q2, m1, m2, l1, l2, g):\n    from math import sin\n    float(q1)\n    return {}"
+    )
     right = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
     assert verdicts(judged(text.format(right))) == {"V": Verdict.SAMPLED}
     value = library_robot(ROBOT).numbers.values["l1"]
-    assert verdicts(judged(text.format(right.replace("l1/2", f"{value}/2")))) == {"V": Verdict.WRONG}
+    assert verdicts(judged(text.format(right.replace("l1/2", f"{value}/2")))) == {
+        "V": Verdict.WRONG
+    }
 
 
 @pytest.mark.parametrize(
@@ -244,7 +254,9 @@ def test_a_class_is_executed_isolated_alone(tmp_path, capsys, monkeypatch):
         main(("grade", "class", "--robot", ROBOT, "--json", "--execute"))
     reports = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert (done.value.code, [one["verdict"] for one in reports]) == (0, ["correct", "correct"])
-    monkeypatch.setattr("dhkit.execution.isolation._probed", lambda *_: Isolation(Kind.NONE, "a test"))
+    monkeypatch.setattr(
+        "dhkit.execution.isolation._probed", lambda *_: Isolation(Kind.NONE, "a test")
+    )
     with pytest.raises(SystemExit) as refused:
         main(("grade", "class", "--robot", ROBOT, "--json", "--execute"))
     assert refused.value.code == 2
@@ -328,7 +340,10 @@ def test_the_command_executes_where_it_is_asked(tmp_path, capsys, monkeypatch):
 
 
 def test_a_notebook_is_executed(judged):
-    cells = [{"cell_type": "code", "source": text, "execution_count": 1} for text in ("%matplotlib inline", LAGRANGE)]
+    cells = [
+        {"cell_type": "code", "source": text, "execution_count": 1}
+        for text in ("%matplotlib inline", LAGRANGE)
+    ]
     report = judged(json.dumps({"cells": cells}), "answer.ipynb")
     assert report.verdict is Verdict.CORRECT
 

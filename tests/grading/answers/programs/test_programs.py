@@ -18,13 +18,23 @@ from dhkit.grading import grade
 from dhkit.grading.answers.documents.entry_statements import statements_of
 from dhkit.grading.answers.sheet_values import Entries, Refusal
 from dhkit.grading.answers.sources import read_source
-from dhkit.symbolic.equations import equations_matlab, equations_python, equations_text, matlab_files, quantities
+from dhkit.symbolic.equations import (
+    equations_matlab,
+    equations_python,
+    equations_text,
+    matlab_files,
+    quantities,
+)
 from dhkit.symbolic.exact.lagrangian import lagrangian
 
 ROBOT = library_robot("planar2r")
 PASSES = ("correct", "correct within rounding", "undecided")
 V = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
-M = ["m1*l1**2/3 + m2*(l1**2 + l2**2/3 + l1*l2*cos(q2))", "m2*l2**2/3 + m2*l1*l2*cos(q2)/2", "m2*l2**2/3"]
+M = [
+    "m1*l1**2/3 + m2*(l1**2 + l2**2/3 + l1*l2*cos(q2))",
+    "m2*l2**2/3 + m2*l1*l2*cos(q2)/2",
+    "m2*l2**2/3",
+]
 PYTHON = [
     "import numpy as np",
     "import sympy as sp",
@@ -290,7 +300,9 @@ def report_of(path, text, robot=ROBOT):
 
 
 def passing(report, name):
-    entries = [entry for entry in report.entries if entry.quantity == name] if report is not None else []
+    entries = (
+        [entry for entry in report.entries if entry.quantity == name] if report is not None else []
+    )
     return bool(entries) and all(entry.verdict.value in PASSES for entry in entries)
 
 
@@ -308,7 +320,9 @@ def computed(text):
         found = {}
         for name in ("M", "V"):
             with contextlib.suppress(Exception):
-                value = sympy.Matrix([names[name]]).subs({sympy.Symbol(k): x for k, x in STATE.items()})
+                value = sympy.Matrix([names[name]]).subs(
+                    {sympy.Symbol(k): x for k, x in STATE.items()}
+                )
                 found[name] = np.array(value.tolist(), dtype=float)
     return found
 
@@ -361,7 +375,12 @@ def test_no_binding_of_a_name_in_matlab_passes(tmp_path, statement):
     rng = random.Random(statement)
     cases = list(itertools.product(("a", "q1", "m2", "sin", "M", "V"), PLACES[".m"]))
     for name, place in rng.sample(cases, 12):
-        bound = statement.replace("@ =", f"{name} =").replace("@(x)", "\0").replace("@", name).replace("\0", "@(x)")
+        bound = (
+            statement.replace("@ =", f"{name} =")
+            .replace("@(x)", "\0")
+            .replace("@", name)
+            .replace("\0", "@(x)")
+        )
         report = report_of(tmp_path / "a.m", inserted(MATLAB, bound, place))
         for quantity, needed in NEEDED.items():
             assert not (passing(report, quantity) and name in needed), (bound, place)
@@ -385,10 +404,31 @@ HARMLESS = {
             "V = V",
             "sp.init_printing()",
         ),
-        *("x = [q1 for q1 in range(3)]", "def f(m1, m2):\n    a = 3\n    return a + m1", "x = lambda q1: 2*q1", "pass"),
-        *("q1 = symbols('q1', real=True)", "from math import pi", "import matplotlib.pyplot as plt", "M.simplify()"),
-        *("if __name__ == '__main__':\n    print(M, V)", "for k in range(3):\n    print(k)", "assert M is not None"),
-        *("m1 = 2.0", "m1 = 2  # kg", "l1 = 1/2", "l1 = 0.5; g = 9.81  # m/s^2", "tau = M*Matrix([1, 2])", "t1 = 3"),
+        *(
+            "x = [q1 for q1 in range(3)]",
+            "def f(m1, m2):\n    a = 3\n    return a + m1",
+            "x = lambda q1: 2*q1",
+            "pass",
+        ),
+        *(
+            "q1 = symbols('q1', real=True)",
+            "from math import pi",
+            "import matplotlib.pyplot as plt",
+            "M.simplify()",
+        ),
+        *(
+            "if __name__ == '__main__':\n    print(M, V)",
+            "for k in range(3):\n    print(k)",
+            "assert M is not None",
+        ),
+        *(
+            "m1 = 2.0",
+            "m1 = 2  # kg",
+            "l1 = 1/2",
+            "l1 = 0.5; g = 9.81  # m/s^2",
+            "tau = M*Matrix([1, 2])",
+            "t1 = 3",
+        ),
         *(
             "class Arm:\n    def __init__(self):\n        self.m1 = 3\n    def M(self):\n        return 3",
             "x = 'V = 3'",
@@ -399,10 +439,26 @@ HARMLESS = {
             "x = f'{V}'",
             "try:\n    x = 1\nfinally:\n    y = 2",
         ),
-        *("x = M.subs(m1, 3)", "f = sp.lambdify((q1, q2), M)", "n = M.shape[0]", "M.det()", "x = sp.latex(V)", "V;"),
+        *(
+            "x = M.subs(m1, 3)",
+            "f = sp.lambdify((q1, q2), M)",
+            "n = M.shape[0]",
+            "M.det()",
+            "x = sp.latex(V)",
+            "V;",
+        ),
     ],
     ".m": [
-        *("disp(M)", "M", "% V = 3", "%{\nV = 3\n%}", "x = 3;", "M = simplify(M);", "V;", "fprintf('V = %f', 3);"),
+        *(
+            "disp(M)",
+            "M",
+            "% V = 3",
+            "%{\nV = 3\n%}",
+            "x = 3;",
+            "M = simplify(M);",
+            "V;",
+            "fprintf('V = %f', 3);",
+        ),
         *(
             "# V = 3",
             "x = 'V = 3';",
@@ -412,8 +468,22 @@ HARMLESS = {
             "q1 = sym('q1', 'real');",
             "tic; toc",
         ),
-        *("m1 = 2;", "l1 = 0.5; g = 9.81; % m/s^2", "pretty(M)", "tau = M*[1; 2];", "if x > 3, disp(x), end", "clc"),
-        *("for k = 1:3\n  disp(k)\nend", "x = M(1,1);", "x = [1 2\n3 4];", "assume(q1 > 0)", "hold on", "warning off"),
+        *(
+            "m1 = 2;",
+            "l1 = 0.5; g = 9.81; % m/s^2",
+            "pretty(M)",
+            "tau = M*[1; 2];",
+            "if x > 3, disp(x), end",
+            "clc",
+        ),
+        *(
+            "for k = 1:3\n  disp(k)\nend",
+            "x = M(1,1);",
+            "x = [1 2\n3 4];",
+            "assume(q1 > 0)",
+            "hold on",
+            "warning off",
+        ),
         *(
             "function x = f(m1, m2)\na = 3;\nx = a + m1;\nend",
             "x = @(q1) 2*q1;",
@@ -424,11 +494,25 @@ HARMLESS = {
 }
 
 
-@pytest.mark.parametrize(("suffix", "statement"), [(s, x) for s, listed in HARMLESS.items() for x in listed])
+@pytest.mark.parametrize(
+    ("suffix", "statement"), [(s, x) for s, listed in HARMLESS.items() for x in listed]
+)
 def test_what_binds_nothing_that_matters_changes_no_verdict(tmp_path, suffix, statement):
     lines = {".py": PYTHON, ".m": MATLAB}[suffix]
     late = statement.startswith(
-        ("function", "M", "V", "disp(M", "pretty", "tau", "sp.pprint", "print(M", "if __", "f =", "n =")
+        (
+            "function",
+            "M",
+            "V",
+            "disp(M",
+            "pretty",
+            "tau",
+            "sp.pprint",
+            "print(M",
+            "if __",
+            "f =",
+            "n =",
+        )
     )
     late = late or re.search(r"\b[MV]\b(?! = 3)", statement)
     for place in PLACES[suffix][-1:] if late else PLACES[suffix]:
@@ -453,11 +537,22 @@ def read(tmp_path):
 
 SPELLINGS = {
     ".py": ["M{i}{j}", "M_{i}{j}", "M_{i}_{j}", "m{i}{j}", "D{i}{j}", "D_{i}{j}"],
-    ".m": ["M{i}{j}", "M_{i}{j}", "M_{i}_{j}", "M({i},{j})", "M({i}, {j})", "D({i},{j})", "m{i}{j}", "D{i}{j}"],
+    ".m": [
+        "M{i}{j}",
+        "M_{i}{j}",
+        "M_{i}_{j}",
+        "M({i},{j})",
+        "M({i}, {j})",
+        "D({i},{j})",
+        "m{i}{j}",
+        "D{i}{j}",
+    ],
 }
 
 
-@pytest.mark.parametrize(("suffix", "spelling"), [(s, x) for s, listed in SPELLINGS.items() for x in listed])
+@pytest.mark.parametrize(
+    ("suffix", "spelling"), [(s, x) for s, listed in SPELLINGS.items() for x in listed]
+)
 def test_entries_of_M(read, suffix, spelling):
     power = "**" if suffix == ".py" else "^"
     lines = [
@@ -470,23 +565,47 @@ def test_entries_of_M(read, suffix, spelling):
     assert dict(answer.texts) == dict(zip([(0, 0), (0, 1), (1, 0), (1, 1)], texts, strict=True))
 
 
-@pytest.mark.parametrize("spelling", ["M[{i}, {j}]", "M[{i},{j}]", "M[{i}][{j}]", "M[..., {i}, {j}]"])
+@pytest.mark.parametrize(
+    "spelling", ["M[{i}, {j}]", "M[{i},{j}]", "M[{i}][{j}]", "M[..., {i}, {j}]"]
+)
 def test_entries_by_python_s_index(read, spelling):
-    lines = [f"{spelling.format(i=i, j=j)} = m1*{10 * i + j}" for i, j in itertools.product((0, 1), (0, 1))]
+    lines = [
+        f"{spelling.format(i=i, j=j)} = m1*{10 * i + j}"
+        for i, j in itertools.product((0, 1), (0, 1))
+    ]
     for zeros in ("", "M = sp.zeros(2, 2)\n", "M = np.zeros((2, 2))\n", "M = Matrix.zeros(2, 2)\n"):
         if "Matrix." in zeros:
             continue
         start = "import numpy as np\nimport sympy as sp\n" + zeros
         answer = read(start + "\n".join(lines)).answers["M"]
-        assert dict(answer.texts) == {(i, j): f"m1*{10 * i + j}" for i, j in itertools.product((0, 1), (0, 1))}
+        assert dict(answer.texts) == {
+            (i, j): f"m1*{10 * i + j}" for i, j in itertools.product((0, 1), (0, 1))
+        }
 
 
 @pytest.mark.parametrize(
     ("name", "quantity", "index"),
     [
-        *(("g1", "g", (0,)), ("g_2", "g", (1,)), ("G1", "g", (0,)), ("tau1", "tau", (0,)), ("tau_2", "tau", (1,))),
-        *(("h2", "h", (1,)), ("C12", "C", (0, 1)), ("C_21", "C", (1, 0)), ("J11", "J", (0, 0)), ("J_62", "J", (5, 1))),
-        *(("T14", "T", (0, 3)), ("A1_14", "A1", (0, 3)), ("A2_1_4", "A2", (0, 3)), ("A114", "A1", (0, 3))),
+        *(
+            ("g1", "g", (0,)),
+            ("g_2", "g", (1,)),
+            ("G1", "g", (0,)),
+            ("tau1", "tau", (0,)),
+            ("tau_2", "tau", (1,)),
+        ),
+        *(
+            ("h2", "h", (1,)),
+            ("C12", "C", (0, 1)),
+            ("C_21", "C", (1, 0)),
+            ("J11", "J", (0, 0)),
+            ("J_62", "J", (5, 1)),
+        ),
+        *(
+            ("T14", "T", (0, 3)),
+            ("A1_14", "A1", (0, 3)),
+            ("A2_1_4", "A2", (0, 3)),
+            ("A114", "A1", (0, 3)),
+        ),
         *(("M_12", "M", (0, 1)), ("N1", "g", (0,)), ("Tau2", "tau", (1,)), ("Jac11", "J", (0, 0))),
     ],
 )
@@ -515,7 +634,12 @@ def test_entries_by_matlab_s_index(read, target, quantity, index):
 def test_entries_that_are_not_assigned_stay_missing_but_zeros_are_zeros(read):
     assert dict(read("M11 = m1\nV = 0").answers["M"].texts) == {(0, 0): "m1"}
     text = "C = zeros(2,2);\nC(1,1) = m1;"
-    assert dict(read(text, ".m").answers["C"].texts) == {(0, 0): "m1", (0, 1): "0", (1, 0): "0", (1, 1): "0"}
+    assert dict(read(text, ".m").answers["C"].texts) == {
+        (0, 0): "m1",
+        (0, 1): "0",
+        (1, 0): "0",
+        (1, 1): "0",
+    }
 
 
 def test_a_wrong_entry_beside_a_right_vector_is_found(tmp_path):
@@ -536,7 +660,9 @@ def test_a_parameter_is_no_entry(tmp_path):
     (tmp_path / "a.py").write_text("m1 = 2.0\nl1 = 0.5\ng = 9.81\nV = m1*g*l1")
     sheet = read_source(tmp_path / "a.py", robot)
     assert set(sheet.answers) == {"V"}
-    assert [note.split(": ")[0] for note in sheet.notes] == ["line 1", "line 3", "line 2"] or len(sheet.notes) == 3
+    assert [note.split(": ")[0] for note in sheet.notes] == ["line 1", "line 3", "line 2"] or len(
+        sheet.notes
+    ) == 3
 
 
 def test_an_ambiguous_entry_of_a_long_arm_is_refused_with_both_readings():
@@ -548,10 +674,20 @@ def test_an_ambiguous_entry_of_a_long_arm_is_refused_with_both_readings():
 
     long, short = LongArm(12), LongArm(7)
     assert [str(x) for x in long.entries("M112")] == ["M(1,12)", "M(11,2)"]
-    assert [str(x) for x in long.entries("M_10_2")] == [str(x) for x in long.entries("M10_2")] == ["M(10,2)"]
+    assert (
+        [str(x) for x in long.entries("M_10_2")]
+        == [str(x) for x in long.entries("M10_2")]
+        == ["M(10,2)"]
+    )
     assert [str(x) for x in long.entries("M110")] == ["M(1,10)"]
     assert [str(x) for x in long.entries("g12")] == ["g(12)"]
-    assert short.entries("M112") == short.entries("M18") == short.entries("M01") == short.entries("g8") == []
+    assert (
+        short.entries("M112")
+        == short.entries("M18")
+        == short.entries("M01")
+        == short.entries("g8")
+        == []
+    )
 
 
 # Scopes, functions, numbers
@@ -575,11 +711,13 @@ def test_an_ambiguous_entry_of_a_long_arm_is_refused_with_both_readings():
         ),
         "t = symbols('t')\nq1 = Function('q1')(t)\nq2 = Function('q2')(t)\n"
         f"M = Matrix([[{M[0]}, {M[1]}], [{M[1]}, {M[2]}]])",
-        f"q = symbols('q1:3')\nM = Matrix([[{M[0]}, {M[1]}], [{M[1]}, {M[2]}]])".replace("(q2)", "(q[1])"),
-        f"q1, q2 = sp.symbols('theta_1 theta_2')\nM = 2*Matrix([[({M[0]})/2, ({M[1]})/2], [({M[1]})/2, ({M[2]})/2]])",
-        f"c = cos(q2)\nM = Matrix([[{M[0]}, {M[1]}], [{M[1]}, {M[2]}]])".replace("cos(q2)*", "c*").replace(
-            "l2*cos(q2)", "l2*c"
+        f"q = symbols('q1:3')\nM = Matrix([[{M[0]}, {M[1]}], [{M[1]}, {M[2]}]])".replace(
+            "(q2)", "(q[1])"
         ),
+        f"q1, q2 = sp.symbols('theta_1 theta_2')\nM = 2*Matrix([[({M[0]})/2, ({M[1]})/2], [({M[1]})/2, ({M[2]})/2]])",
+        f"c = cos(q2)\nM = Matrix([[{M[0]}, {M[1]}], [{M[1]}, {M[2]}]])".replace(
+            "cos(q2)*", "c*"
+        ).replace("l2*cos(q2)", "l2*c"),
     ],
 )
 def test_functions_and_symbols_of_python(tmp_path, text):
@@ -690,7 +828,9 @@ def test_many_names_are_all_kept(read):
     sheet = read("\n".join(["x0 = m1", *names, "V = x499"]))
     assert len(sheet.names.parameters) == 499
     with pytest.raises(AnswerError, match="more than 2000 names"):
-        read("\n".join(["x0 = m1", *(f"x{k} = x{k - 1} + m1" for k in range(1, 2100)), "V = x2099"]))
+        read(
+            "\n".join(["x0 = m1", *(f"x{k} = x{k - 1} + m1" for k in range(1, 2100)), "V = x2099"])
+        )
 
 
 def test_names_of_functions_do_not_leak(read):
@@ -706,11 +846,45 @@ G_DEF = f"def G(q):\n  q1, q2 = q\n  return [{TRUE}]\n"
 G_LIST = f"G = [{TRUE}]\n"
 G_MATLAB = f"function G=grav(q)\nG=[{TRUE}];\nend\n"
 AGAIN = [
-    *("G = 0", "G = -G(q)", "G = neg(G)", "G += 1", "G, H = 0, 0", "(G := 0)", "if 1: G=0", "for G in [1]: pass"),
-    *("del G", "class G: pass", "from x import G", "import G", "try: pass\nexcept E as G: pass", "[G, H] = f()"),
-    *("def foo(): global G; G=0", "def G(q): return 0", "def G(q): pass", "G = lambda q: print(q)", "G = H = abs"),
-    *("with f() as G: pass", "while G := f(): pass", "async def G(): pass", "G: int = 3", "import numpy as G"),
-    *("from math import cos as G", "match f():\n  case G: pass", "G.q = 3", "G = symbols('G')", "(G, *H) = f()"),
+    *(
+        "G = 0",
+        "G = -G(q)",
+        "G = neg(G)",
+        "G += 1",
+        "G, H = 0, 0",
+        "(G := 0)",
+        "if 1: G=0",
+        "for G in [1]: pass",
+    ),
+    *(
+        "del G",
+        "class G: pass",
+        "from x import G",
+        "import G",
+        "try: pass\nexcept E as G: pass",
+        "[G, H] = f()",
+    ),
+    *(
+        "def foo(): global G; G=0",
+        "def G(q): return 0",
+        "def G(q): pass",
+        "G = lambda q: print(q)",
+        "G = H = abs",
+    ),
+    *(
+        "with f() as G: pass",
+        "while G := f(): pass",
+        "async def G(): pass",
+        "G: int = 3",
+        "import numpy as G",
+    ),
+    *(
+        "from math import cos as G",
+        "match f():\n  case G: pass",
+        "G.q = 3",
+        "G = symbols('G')",
+        "(G, *H) = f()",
+    ),
     "if 1:\n  def G(q): return 0",
 ]
 
@@ -725,7 +899,15 @@ def test_a_function_that_is_bound_again_is_no_answer(tmp_path, start, again):
 
 @pytest.mark.parametrize(
     "again",
-    ["G=0;", "G = @(q) 0;", "G(1) = 2;", "clear x; G = [0 0];", "if 1, G=0; end", "for G=1:2, end", "[G, H] = f(1);"],
+    [
+        "G=0;",
+        "G = @(q) 0;",
+        "G(1) = 2;",
+        "clear x; G = [0 0];",
+        "if 1, G=0; end",
+        "for G=1:2, end",
+        "[G, H] = f(1);",
+    ],
 )
 def test_a_handle_that_is_bound_again_is_no_answer(tmp_path, again):
     start = f"G = @(q1,q2) [{TRUE}];\n"
@@ -740,8 +922,14 @@ def test_a_handle_that_is_bound_again_is_no_answer(tmp_path, again):
             f"def G(q):\n  q1, q2 = q\n  {G_LIST}  return {x}"
             for x in ("-G", "", "neg(G)", "[-G[0], G[1]]", "2*G", "H")
         ),
-        *(f"def dyn(q):\n  {G_LIST}  return {x}" for x in ("-G", "neg(G)", "G*s", "[-x for x in G]", "-np.array(G)")),
-        *(f"def dyn(q):\n  {G_LIST}  return G\nG = {x}" for x in ("-dyn(q)", "0", "neg(dyn(q))", "f()")),
+        *(
+            f"def dyn(q):\n  {G_LIST}  return {x}"
+            for x in ("-G", "neg(G)", "G*s", "[-x for x in G]", "-np.array(G)")
+        ),
+        *(
+            f"def dyn(q):\n  {G_LIST}  return G\nG = {x}"
+            for x in ("-dyn(q)", "0", "neg(dyn(q))", "f()")
+        ),
         f"def dyn(q):\n  {G_LIST}  y = -G\n  return y",
         f"def dyn(q1, q2):\n  {G_LIST}  return G\nG = dyn(q2, q1)",
         f"def dyn(q):\n  {G_LIST}  return G\nq = [-q1, q2]\nG = dyn(q)",
@@ -821,9 +1009,15 @@ def test_functions_of_matlab_that_change_no_name(tmp_path, text):
 @pytest.mark.parametrize(
     "text",
     [
-        *(f"def G(q, {x}):\n  return [{TRUE}]" for x in ("g=-9.81", "m1=5", "*, l1=3", "q1=0", "m1=None", "g=9.8")),
+        *(
+            f"def G(q, {x}):\n  return [{TRUE}]"
+            for x in ("g=-9.81", "m1=5", "*, l1=3", "q1=0", "m1=None", "g=9.8")
+        ),
         *(f"G = lambda q, {x}: [{TRUE}]" for x in ("m1=3", "g=-9.81", "*, l2=1", "q2=q1", "m2=m1")),
-        *(f"def G(q, p={x}):\n  m1 = p.m1\n  return [{TRUE}]" for x in ("dict(m1=5)", "{'m1': 5}", "f()", "None", "P")),
+        *(
+            f"def G(q, p={x}):\n  m1 = p.m1\n  return [{TRUE}]"
+            for x in ("dict(m1=5)", "{'m1': 5}", "f()", "None", "P")
+        ),
         f"class P:\n  m1 = 5\nX = P()\ndef G(q, p=X):\n  m1 = p.m1\n  return [{TRUE}]",
         f"def G(q, c1=1):\n  return [{TRUE}]".replace("cos(q1)+", "c1+"),
     ],
@@ -835,7 +1029,15 @@ def test_defaults_other_than_the_file_s_numbers_are_refused(tmp_path, text):
 @pytest.mark.parametrize(
     "half",
     [
-        *("Integer(1/2)", "sp.Integer(0.5)", "int(0.5)", "Rational(1/2)", "Rational(1.0/2)", "Integer(1)//2", "1 % 2"),
+        *(
+            "Integer(1/2)",
+            "sp.Integer(0.5)",
+            "int(0.5)",
+            "Rational(1/2)",
+            "Rational(1.0/2)",
+            "Integer(1)//2",
+            "1 % 2",
+        ),
         *(
             "I2(1/2)",
             "R(1/2)",
@@ -852,7 +1054,9 @@ def test_numbers_that_sympy_makes_others_of_are_refused(read, half):
     assert isinstance(read(f"{head}V = m1*g*l1*({half})").answers["V"], Refusal)
 
 
-@pytest.mark.parametrize("half", ["Integer(1)/2", "Rational(1, 2)", "sp.Rational(1, 2)", "Rational(0.5)", "S(1)/2"])
+@pytest.mark.parametrize(
+    "half", ["Integer(1)/2", "Rational(1, 2)", "sp.Rational(1, 2)", "Rational(0.5)", "S(1)/2"]
+)
 def test_numbers_that_sympy_leaves_as_they_are(read, half):
     assert not isinstance(read(f"import sympy as sp\nV = m1*g*l1*({half})").answers["V"], Refusal)
 
@@ -860,17 +1064,34 @@ def test_numbers_that_sympy_leaves_as_they_are(read, half):
 @pytest.mark.parametrize(
     "change",
     [
-        *("a.b=G\na.b[0]=1", "def w(): return G\nw()[0]=1", "y=max(G,[0]); y[0]=1", "def w(): return G\ny=w(); y[0]=1"),
+        *(
+            "a.b=G\na.b[0]=1",
+            "def w(): return G\nw()[0]=1",
+            "y=max(G,[0]); y[0]=1",
+            "def w(): return G\ny=w(); y[0]=1",
+        ),
         *("a['k']=G\na['k'][0]=1", "y=min(G, G); y[0]=1", "a.b.c=G\nf(a)"),
-        *("def u(): w()[0]=1\ndef w(): return G\nu()", "def w(x): return x\ny=w(G); y[0]=1", "y=f(G)\ny[0]+=1"),
+        *(
+            "def u(): w()[0]=1\ndef w(): return G\nu()",
+            "def w(x): return x\ny=w(G); y[0]=1",
+            "y=f(G)\ny[0]+=1",
+        ),
         *(
             "a = G\na[0], y = 1, 2",
             "a, b = f(G)\na[0]=1",
             "y=next(iter([G])); y[0]=1",
             "def w(): yield G\nfor y in w(): y[0]=1",
         ),
-        *("def w():\n  A = G\n  return A\nw()[0]=1", "def w(): return G\nw().append(1)", "w = lambda: G\nw()[0] = 1"),
-        *("def cos(x): return x\ny = cos(G); y[0]=1", "y=sum([], start=G); y[0]=1", "def w(): return G\ndel w()[0]"),
+        *(
+            "def w():\n  A = G\n  return A\nw()[0]=1",
+            "def w(): return G\nw().append(1)",
+            "w = lambda: G\nw()[0] = 1",
+        ),
+        *(
+            "def cos(x): return x\ny = cos(G); y[0]=1",
+            "y=sum([], start=G); y[0]=1",
+            "def w(): return G\ndel w()[0]",
+        ),
     ],
 )
 def test_a_list_that_is_changed_by_another_way_is_no_answer(tmp_path, change):
@@ -913,7 +1134,9 @@ def test_a_function_of_a_parameter_s_name_says_how_to_name_it(read):
 def test_matrices_of_matlab(tmp_path, text):
     entries = dict(zip("ABD", (x.replace("**", "^") for x in M), strict=True))
     short = "c2" if "c2" in text else "cos(q2)"
-    text = re.sub(r"\b[ABD]\b", lambda found: f"({entries[found[0]]})".replace("cos(q2)", short), text)
+    text = re.sub(
+        r"\b[ABD]\b", lambda found: f"({entries[found[0]]})".replace("cos(q2)", short), text
+    )
     report = report_of(tmp_path / "a.m", text)
     assert passing(report, "M"), report
 
@@ -921,7 +1144,18 @@ def test_matrices_of_matlab(tmp_path, text):
 @pytest.mark.parametrize(
     "value",
     [
-        *("m1^l1^2", "2^3^2*m1", "m1*1:2", "m1(end)", "q(end)*m1", "m1\\l1", "m1 == 2", "~m1", "m1'*[1;2]", "x{1}*m1"),
+        *(
+            "m1^l1^2",
+            "2^3^2*m1",
+            "m1*1:2",
+            "m1(end)",
+            "q(end)*m1",
+            "m1\\l1",
+            "m1 == 2",
+            "~m1",
+            "m1'*[1;2]",
+            "x{1}*m1",
+        ),
         *(
             "2m1",
             "1d3*m1",
@@ -956,14 +1190,26 @@ def test_transposes_are_taken(read):
 def notebook(*cells, **metadata):
     import json
 
-    listed = [{"cell_type": "code", "source": cell, "execution_count": k} for k, cell in enumerate(cells, start=1)]
-    return json.dumps({"cells": [{"cell_type": "markdown", "source": "V = 3"}, *listed], "metadata": metadata})
+    listed = [
+        {"cell_type": "code", "source": cell, "execution_count": k}
+        for k, cell in enumerate(cells, start=1)
+    ]
+    return json.dumps(
+        {"cells": [{"cell_type": "markdown", "source": "V = 3"}, *listed], "metadata": metadata}
+    )
 
 
 @pytest.mark.parametrize(
     "line",
     [
-        *("%matplotlib inline", "!pip install sympy", "%pip install sympy", "?print", "print?", "%load_ext autoreload"),
+        *(
+            "%matplotlib inline",
+            "!pip install sympy",
+            "%pip install sympy",
+            "?print",
+            "print?",
+            "%load_ext autoreload",
+        ),
         *("%%time", "%timeit 3", "%%capture", "%config x = 3", "%precision 4"),
     ],
 )
@@ -974,7 +1220,16 @@ def test_magics_that_assign_nothing_are_dropped(read, line):
 
 @pytest.mark.parametrize(
     "line",
-    ["%run a.py", "%load a.py", "%store -r V", "%%python2", "%pylab", "%reset", "%%bash2", "%macro x"],
+    [
+        "%run a.py",
+        "%load a.py",
+        "%store -r V",
+        "%%python2",
+        "%pylab",
+        "%reset",
+        "%%bash2",
+        "%macro x",
+    ],
 )
 def test_magics_that_may_assign_refuse_the_notebook(read, line):
     with pytest.raises(AnswerError, match="cell 1"):
@@ -984,7 +1239,13 @@ def test_magics_that_may_assign_refuse_the_notebook(read, line):
 @pytest.mark.parametrize(
     "cell",
     [
-        *("%time V = 3", "%time V.fill(0)", "%timeit V.row_swap(0, 1)", "%%timeit\nV = 3", "%%capture V\nprint(1)"),
+        *(
+            "%time V = 3",
+            "%time V.fill(0)",
+            "%timeit V.row_swap(0, 1)",
+            "%%timeit\nV = 3",
+            "%%capture V\nprint(1)",
+        ),
         "    V = 2*V",
     ],
 )
@@ -999,7 +1260,9 @@ def test_each_cell_is_python_by_itself(read):
         read(notebook("V = m1*g", 's = """', "V = 2*V", '"""'), ".ipynb")
 
 
-@pytest.mark.parametrize("cell", ["%%bash\nV=3", "%%latex\n$V = 3$", "%%html\n<b>V = 3</b>", "%%writefile a.py\nV = 3"])
+@pytest.mark.parametrize(
+    "cell", ["%%bash\nV=3", "%%latex\n$V = 3$", "%%html\n<b>V = 3</b>", "%%writefile a.py\nV = 3"]
+)
 def test_cells_of_other_languages_are_left_out(read, cell):
     assert read(notebook(cell, "V = m1*g"), ".ipynb").answers == {"V": "m1*g"}
 
@@ -1014,7 +1277,10 @@ def test_lines_of_notebooks_are_those_of_their_cells(read):
 def test_cells_that_were_run_in_another_order_are_noted(read):
     import json
 
-    cells = [{"cell_type": "code", "source": f"x{k} = {k}\nV = m1", "execution_count": 9 - k} for k in range(3)]
+    cells = [
+        {"cell_type": "code", "source": f"x{k} = {k}\nV = m1", "execution_count": 9 - k}
+        for k in range(3)
+    ]
     assert "another order" in read(json.dumps({"cells": cells}), ".ipynb").notes[0]
 
 
@@ -1027,7 +1293,9 @@ def test_a_notebook_of_octave(read):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["planar2r", "polar_rp", "cart_pendulum", "cobra600", "planar3r", "puma560"])
+@pytest.mark.parametrize(
+    "robot", ["planar2r", "polar_rp", "cart_pendulum", "cobra600", "planar3r", "puma560"]
+)
 def test_equations_are_read_back(tmp_path, robot):
     description = library_robot(robot)
     names = ("M", "C", "g") if description.n > 3 else ("M", "C", "h", "g", "tau", "K", "V")

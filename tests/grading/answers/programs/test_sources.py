@@ -69,7 +69,11 @@ def graded(tmp_path, name, text):
         ("a.py", PYTHON, ("M", "V")),
         ("a.m", MATLAB, ("g", "M")),
         ("a.tex", LATEX, ("M", "g")),
-        ("a.ipynb", json.dumps({"cells": [{"cell_type": "code", "source": PYTHON.splitlines(True)}]}), ("M", "V")),
+        (
+            "a.ipynb",
+            json.dumps({"cells": [{"cell_type": "code", "source": PYTHON.splitlines(True)}]}),
+            ("M", "V"),
+        ),
     ],
 )
 def test_homework_as_it_is_handed_in(tmp_path, name, text, quantities):
@@ -98,12 +102,17 @@ def test_what_is_changed_afterwards_is_never_taken_for_what_it_was(tmp_path, lin
     assert (
         not report
         if report is not None
-        else re.search("line 1, and is the robot's own name|(assigned twice|changed after).* line [23]", refusal)
+        else re.search(
+            "line 1, and is the robot's own name|(assigned twice|changed after).* line [23]",
+            refusal,
+        )
     )
 
 
 def test_a_name_of_the_students_goes_before_the_shorthand(tmp_path):
-    lines = "c1 = cos(q1)/2\ng = [(m1/2 + m2)*g*l1*2*c1 + m2*g*l2*cos(q1+q2)/2, m2*g*l2*cos(q1+q2)/2]"
+    lines = (
+        "c1 = cos(q1)/2\ng = [(m1/2 + m2)*g*l1*2*c1 + m2*g*l2*cos(q1+q2)/2, m2*g*l2*cos(q1+q2)/2]"
+    )
     assert graded(tmp_path, "a.py", lines).verdict is Verdict.CORRECT
 
 

@@ -122,7 +122,9 @@ def _name(side: str) -> str:
 
     M(1, 2) and M[0, 1] are M1_2: numbers in parentheses count from 1, as in MATLAB, those in brackets from 0.
     """
-    match = re.fullmatch(r"([A-Za-z]\w*)\s*(?:\(([^()]*)\)|\[(\d+)\]\[(\d+)\]|\[([\d,\s]+)\])?", side, re.ASCII)
+    match = re.fullmatch(
+        r"([A-Za-z]\w*)\s*(?:\(([^()]*)\)|\[(\d+)\]\[(\d+)\]|\[([\d,\s]+)\])?", side, re.ASCII
+    )
     if match is None:
         return ""
     name, arguments, i, j, inside = match.groups()

@@ -9,18 +9,32 @@ from itertools import chain
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bounds import BOUNDS
-from dhkit.grading.answers.documents.latex_rows import MATRIX_BEGINNING, has_symmetry_marks, marked_places, matrix_rows
+from dhkit.grading.answers.documents.latex_rows import (
+    MATRIX_BEGINNING,
+    has_symmetry_marks,
+    marked_places,
+    matrix_rows,
+)
 from dhkit.grading.answers.documents.latex_source import document_statements
 from dhkit.grading.answers.documents.statements import Statement, left_hand_name
 from dhkit.grading.answers.latex import latex_tokens
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
-from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Entries, EqualFormulas, Names, Refusal
+from dhkit.grading.answers.sheet_values import (
+    NO_NAMES,
+    AnswerSheet,
+    Entries,
+    EqualFormulas,
+    Names,
+    Refusal,
+)
 from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
 
-_VALUE_WORDS = re.compile(r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}")
+_VALUE_WORDS = re.compile(
+    r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}"
+)
 """Macros that the value of a joint variable may have besides numbers."""
 
 _NUMBER_WITH_UNIT = re.compile(
@@ -36,7 +50,11 @@ _ADVICE = "write it out in one formula, or on a sheet"
 
 
 def latex_answers(
-    text: str, file: str, line_name: Callable[[int], str], description: Description, names: Names = NO_NAMES
+    text: str,
+    file: str,
+    line_name: Callable[[int], str],
+    description: Description,
+    names: Names = NO_NAMES,
 ) -> AnswerSheet:
     """Return the answers of a document.
 
@@ -101,7 +119,11 @@ class _DocumentAnswers:
 
     def sheet(self, file: str) -> AnswerSheet:
         answers: dict[str, str | EqualFormulas | Entries | Refusal] = {}
-        own = {name for name in self.by_name if name in self.quantities.whole and self._of_quantity(name, name)}
+        own = {
+            name
+            for name in self.by_name
+            if name in self.quantities.whole and self._of_quantity(name, name)
+        }
         for name in list(self.by_name):
             quantity = self.quantities.quantity(name)
             is_alias = self.quantities.is_alias(name)
@@ -116,11 +138,15 @@ class _DocumentAnswers:
                 answers[quantity] = entries
             elif not all(name in self._used for name, _ in self._entry_statements(quantity)):
                 _, line = next(self._entry_statements(quantity))
-                answers[quantity] = _refused(f"{quantity} is given as a whole and entry by entry, in {line}")
+                answers[quantity] = _refused(
+                    f"{quantity} is given as a whole and entry by entry, in {line}"
+                )
         for name in self.by_name:
             if self.names.vocabulary.is_state(name):
                 self._defining(name)
-        return source_sheet(file, self.quantities.n, answers, self.parameters, self.notes, self.left_out)
+        return source_sheet(
+            file, self.quantities.n, answers, self.parameters, self.notes, self.left_out
+        )
 
     # Quantities
 
@@ -132,7 +158,9 @@ class _DocumentAnswers:
             is_matrix = MATRIX_BEGINNING.search(formula) is not None
             is_number = _NUMBER_WITH_UNIT.fullmatch(formula) is not None
             if self.quantities.is_scalar(quantity) and not is_matrix:
-                is_other_number = is_number and (quantity in ("K", "L") or self.quantities.is_alias(name))
+                is_other_number = is_number and (
+                    quantity in ("K", "L") or self.quantities.is_alias(name)
+                )
                 fits = not self.quantities.is_parameter(name) and not is_other_number
             else:
                 fits = is_matrix and quantity not in _ENERGIES
@@ -149,7 +177,9 @@ class _DocumentAnswers:
         if broken := next((s for s in statements if s.problem), None):
             return _refused(f"{self._line(broken)}: {broken.problem}")
         if other := next((s for s in statements if s.formulas != first.formulas), None):
-            return _refused(f"{name} is assigned twice, in {self._line(first)} and in {self._line(other)}")
+            return _refused(
+                f"{name} is assigned twice, in {self._line(first)} and in {self._line(other)}"
+            )
         self._note_relations(first)
         formulas = first.formulas
         if quantity not in _ENERGIES:
@@ -159,7 +189,9 @@ class _DocumentAnswers:
                 return entries
         return self._with_definitions(formulas, {name})
 
-    def _with_definitions(self, formulas: tuple[str, ...], outer: set[str]) -> str | EqualFormulas | Refusal:
+    def _with_definitions(
+        self, formulas: tuple[str, ...], outer: set[str]
+    ) -> str | EqualFormulas | Refusal:
         """Return formulas whose names are all defined, or why they cannot be."""
         for formula in formulas:
             if problem := self._define_names_in(formula, outer):
@@ -174,7 +206,11 @@ class _DocumentAnswers:
     def _matrices(self, quantity: str, statement: Statement) -> tuple[str, ...]:
         """Return the sides of a chain that are matrices of the quantity's shape, the last in any case."""
         *earlier, last = statement.formulas
-        fitting = [side for side in earlier if self._rows_of_shape(quantity, side) and not has_symmetry_marks(side)]
+        fitting = [
+            side
+            for side in earlier
+            if self._rows_of_shape(quantity, side) and not has_symmetry_marks(side)
+        ]
         if has_symmetry_marks(last):
             fitting = []
         if len(fitting) < len(earlier):
@@ -211,12 +247,18 @@ class _DocumentAnswers:
         for k, (entry, name) in enumerate(zip(flat, named, strict=True)):
             index = (k,) if len(shape) == 1 else divmod(k, shape[1])
             if index not in marks:
-                texts[index] = self._entry(name) if name else self._with_definitions((entry,), set())
+                texts[index] = (
+                    self._entry(name) if name else self._with_definitions((entry,), set())
+                )
         return Entries(texts)
 
     def _entry_name(self, entry: str) -> str:
         name = left_hand_name(entry)
-        is_entry = name in self.by_name and self.quantities.entries(name) and not self.quantities.is_parameter(name)
+        is_entry = (
+            name in self.by_name
+            and self.quantities.entries(name)
+            and not self.quantities.is_parameter(name)
+        )
         return name if is_entry else ""
 
     # Entries
@@ -250,7 +292,9 @@ class _DocumentAnswers:
             text = self._entry(name)
             if texts.setdefault(target.quantity, {}).setdefault(target.index or (), text) != text:
                 refused[target.quantity] = _refused(f"{target} is assigned twice, in {line}")
-        return {quantity: Entries(dict(sorted(own.items()))) for quantity, own in texts.items()} | refused
+        return {
+            quantity: Entries(dict(sorted(own.items()))) for quantity, own in texts.items()
+        } | refused
 
     def _is_part_of_energy(self, name: str, target: Target) -> bool:
         """Whether a name is rather a height or a transform that an energy is made of than an entry of h, T, J or A."""
@@ -287,7 +331,8 @@ class _DocumentAnswers:
         """Return the names that a formula uses, also together with a number after them."""
         try:
             tokens = latex_tokens(
-                to_ascii(formula)[0], lambda name: plain_name(name) in self.by_name or self.names.vocabulary.knows(name)
+                to_ascii(formula)[0],
+                lambda name: plain_name(name) in self.by_name or self.names.vocabulary.knows(name),
             )
         except AnswerError:
             return []
@@ -302,7 +347,9 @@ class _DocumentAnswers:
 
     def _define_names_in(self, formula: str, outer: set[str]) -> str:
         """Define the document's own names that a formula uses, each after those that it needs; return why not."""
-        waiting: list[tuple[str, str | None]] = [(name, None) for name in reversed(self._names_in(formula))]
+        waiting: list[tuple[str, str | None]] = [
+            (name, None) for name in reversed(self._names_in(formula))
+        ]
         open_names = set(outer)
         while waiting:
             name, definition = waiting.pop()
@@ -326,7 +373,9 @@ class _DocumentAnswers:
             self._used.add(name)
             open_names.add(name)
             waiting.append((name, definition))
-            waiting += [(other, None) for other in reversed(self._names_in(definition)) if other != name]
+            waiting += [
+                (other, None) for other in reversed(self._names_in(definition)) if other != name
+            ]
             if len(self.parameters) + len(waiting) > BOUNDS.definitions * 10:
                 return f"made of more than {BOUNDS.definitions} names"
         return ""
@@ -345,7 +394,9 @@ class _DocumentAnswers:
             formula = statement.formulas[-1]
             if MATRIX_BEGINNING.search(formula) and self.quantities.quantity(name):
                 continue
-            if self.names.vocabulary.is_state(name) and not re.search(r"[A-Za-z]", _VALUE_WORDS.sub("", formula)):
+            if self.names.vocabulary.is_state(name) and not re.search(
+                r"[A-Za-z]", _VALUE_WORDS.sub("", formula)
+            ):
                 self._add(self.left_out, self._quote(statement))
             else:
                 defining.append(statement)
@@ -353,20 +404,33 @@ class _DocumentAnswers:
 
     def _changing(self, name: str) -> list[Statement]:
         """Return the statements that give a name another meaning than its usual one."""
-        return [statement for statement in self._defining(name) if not self._keeps_usual_meaning(name, statement)]
+        return [
+            statement
+            for statement in self._defining(name)
+            if not self._keeps_usual_meaning(name, statement)
+        ]
 
     def _keeps_usual_meaning(self, name: str, statement: Statement) -> bool:
         formula = statement.formulas[-1]
         if len(statement.formulas) > 1 or statement.problem:
             return False
         if self.quantities.is_parameter(name) and (number := _NUMBER_WITH_UNIT.fullmatch(formula)):
-            is_same = is_same_number(self.names.parameter_value(name), float(number[1].replace(" ", "")))
+            is_same = is_same_number(
+                self.names.parameter_value(name), float(number[1].replace(" ", ""))
+            )
             if is_same:
-                self._add(self.notes, f"{self._line(statement)}: {name} = {formula[:40]} is the file's own number")
+                self._add(
+                    self.notes,
+                    f"{self._line(statement)}: {name} = {formula[:40]} is the file's own number",
+                )
             return is_same
         other = left_hand_name(formula)
         meaning = self.names.find(other) if other else None
-        return meaning is not None and meaning == self.names.find(name) and self.names.is_reserved(name)
+        return (
+            meaning is not None
+            and meaning == self.names.find(name)
+            and self.names.is_reserved(name)
+        )
 
     def _problem(self, name: str) -> str:
         """Return why a name cannot be relied on; nothing where it can."""

@@ -23,7 +23,16 @@ ROWS = word_set(
 _JOINED = frozenset(("eqnarray", "IEEEeqnarray"))
 """Environments with an & on either side of the relation."""
 _OPTIONED = frozenset(
-    ("alignat", "alignedat", "xalignat", "IEEEeqnarray", "empheq", "multlined", "gathered", "aligned")
+    (
+        "alignat",
+        "alignedat",
+        "xalignat",
+        "IEEEeqnarray",
+        "empheq",
+        "multlined",
+        "gathered",
+        "aligned",
+    )
 )
 """Environments whose name options or columns may follow."""
 _MARK = re.compile(
@@ -83,7 +92,9 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
     line
         Its first line, from 1.
     """
-    text = _SYSTEM.sub(lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text)
+    text = _SYSTEM.sub(
+        lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text
+    )
     matrices: list[str] = []  # open environments whose rows are not equations
     environments = [""]  # open environments of rows
     braces = 0

@@ -17,7 +17,15 @@ from dhkit.grading.answers.documents.latex_statements import (
     latex_statements,
 )
 from dhkit.grading.answers.documents.statements import Statement
-from dhkit.grading.answers.latex import DOT_MACROS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, STYLE_MACROS, SYMBOL_MACROS
+from dhkit.grading.answers.latex import (
+    DOT_MACROS,
+    FRACTIONS,
+    GREEK,
+    SIZES,
+    SPACE_NAMES,
+    STYLE_MACROS,
+    SYMBOL_MACROS,
+)
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
 _MACRO = re.compile(
@@ -38,8 +46,31 @@ _CHANGES = re.compile(
 """Commands that may change the meaning of all that follows, and definitions, also of macros that are not letters."""
 
 _READ_MACROS = frozenset(
-    {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *SYMBOL_MACROS, *DOT_MACROS, *STYLE_MACROS, *SIZES, *SPACE_NAMES}
-    | {"sqrt", "over", "partial", "top", "begin", "end", "label", "tag", "equiv", "approx", "pm", "mp", "mbox"}
+    {
+        *GREEK,
+        *FUNCTION_NAMES,
+        *FRACTIONS,
+        *SYMBOL_MACROS,
+        *DOT_MACROS,
+        *STYLE_MACROS,
+        *SIZES,
+        *SPACE_NAMES,
+    }
+    | {
+        "sqrt",
+        "over",
+        "partial",
+        "top",
+        "begin",
+        "end",
+        "label",
+        "tag",
+        "equiv",
+        "approx",
+        "pm",
+        "mp",
+        "mbox",
+    }
 )
 """Macros that have a meaning, which no document should change."""
 
@@ -49,13 +80,19 @@ _SYMBOL = re.compile(
 )
 """One symbol, perhaps with an accent and an index: a macro that stands for it is replaced by it."""
 
-_HIDDEN = re.compile(r"\\begin\s*\{(verbatim\*?|comment|lstlisting|minted|filecontents\*?)\}|\\iffalse(?![A-Za-z])")
+_HIDDEN = re.compile(
+    r"\\begin\s*\{(verbatim\*?|comment|lstlisting|minted|filecontents\*?)\}|\\iffalse(?![A-Za-z])"
+)
 
-_INNER_ROWS = frozenset(["cases", "dcases", "rcases", "split", "aligned", "gathered", "multlined", "alignedat"])
+_INNER_ROWS = frozenset(
+    ["cases", "dcases", "rcases", "split", "aligned", "gathered", "multlined", "alignedat"]
+)
 """Environments that stand inside displays."""
 
 _OPENING = re.compile(
-    r"(?<!\\)\$\$?|(?<!\\)\\\[|\\\(|\\begin\{(?P<name>(?:" + "|".join(sorted(ROWS - _INNER_ROWS)) + r")\*?)\}"
+    r"(?<!\\)\$\$?|(?<!\\)\\\[|\\\(|\\begin\{(?P<name>(?:"
+    + "|".join(sorted(ROWS - _INNER_ROWS))
+    + r")\*?)\}"
 )
 _CLOSERS = {"$": "$", "$$": "$$", "\\[": "\\]", "\\(": "\\)"}
 
@@ -112,11 +149,20 @@ def _statements(text: str) -> Iterator[Statement]:
         for k, statement in enumerate(statements):
             used = [why for name, why in problems.items() if _uses(statement.text, name)]
             if used or lost:
-                statement = replace(statement, problem=used[0] if used else statement.problem or lost[0])
+                statement = replace(
+                    statement, problem=used[0] if used else statement.problem or lost[0]
+                )
             is_rest = STARTS_WITH_RELATION.match(statement.text) or not has_relation(statement.text)
-            goes_on = k == 0 and not display.is_inline and STARTS.match(statement.text) is not None and is_rest
+            goes_on = (
+                k == 0
+                and not display.is_inline
+                and STARTS.match(statement.text) is not None
+                and is_rest
+            )
             if goes_on and last is not None and not statement.targets:
-                yield replace(last, problem=f"it goes on in another display, in line {display.line}")
+                yield replace(
+                    last, problem=f"it goes on in another display, in line {display.line}"
+                )
                 last = None
                 continue
             if last is not None:
@@ -209,7 +255,9 @@ def _refuse_changes(text: str) -> None:
     for match in _CHANGES.finditer(text):
         if match.start() not in definitions:
             line = text.count("\n", 0, match.start()) + 1
-            raise AnswerError(f"line {line}: {match[0]} may change what formulas mean, and is not read")
+            raise AnswerError(
+                f"line {line}: {match[0]} may change what formulas mean, and is not read"
+            )
 
 
 def _macros(text: str) -> dict[str, _Macro]:
@@ -229,7 +277,9 @@ def _macros(text: str) -> dict[str, _Macro]:
         name = match[1] or match[2]
         body = re.compile(r"\s*\{([^{}]*(?:\{[^{}]*\}[^{}]*)*)\}").match(text, match.end())
         symbol = body[1].strip() if body else ""
-        is_command = text.startswith(("\\newcommand", "\\renewcommand", "\\providecommand", "\\def"), match.start())
+        is_command = text.startswith(
+            ("\\newcommand", "\\renewcommand", "\\providecommand", "\\def"), match.start()
+        )
         is_symbol = _SYMBOL.fullmatch(symbol) is not None and is_command
         if name in _READ_MACROS and symbol not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
             is_symbol = False

@@ -8,7 +8,12 @@ from dataclasses import replace
 
 from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import Row, rows_of
-from dhkit.grading.answers.documents.statements import SPACE, Statement, left_hand_name, statement_of
+from dhkit.grading.answers.documents.statements import (
+    SPACE,
+    Statement,
+    left_hand_name,
+    statement_of,
+)
 from dhkit.grading.answers.tokens import word_set
 
 _EQUAL = re.compile(
@@ -38,7 +43,19 @@ _LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;]|\.(?!\d))")
 """Text in front of a formula that is not a part of it."""
 
 _TRAILING = (
-    *("\\,", "\\;", "\\:", "\\!", "\\>", "\\ ", "\\quad", "\\qquad", "\\enspace", "\\thinspace", "\\space"),
+    *(
+        "\\,",
+        "\\;",
+        "\\:",
+        "\\!",
+        "\\>",
+        "\\ ",
+        "\\quad",
+        "\\qquad",
+        "\\enspace",
+        "\\thinspace",
+        "\\space",
+    ),
     *("\\therefore", "{}", " ", "\t", "\n", "~", ",", ";", "."),
 )
 """Text after a formula that is not a part of it."""
@@ -50,7 +67,9 @@ STARTS = re.compile(
 """Beginning of a row that continues the formula of the row before."""
 
 STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:{_EQUAL.pattern})")
-_ENDS = re.compile(rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$")
+_ENDS = re.compile(
+    rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$"
+)
 """End of a row whose formula the next row continues."""
 
 _BRACKET = re.compile(
@@ -61,7 +80,9 @@ _BRACKET = re.compile(
 _OPENING = ("(", "[", "{", r"\{")
 _CLOSING = (")", "]", "}", r"\}")
 
-_SYMMETRIC = re.compile(r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}")
+_SYMMETRIC = re.compile(
+    r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}"
+)
 _UNIT = re.compile(r"(?:[/ .*]*+(?>kg|mm|cm|Nm|rad|deg|[msNJWg])(?:\^?-?\d)?+)++", re.ASCII)
 """A unit such as kg m^2 or N m/rad. Groups are atomic: "mm" reads two ways, and all of them take exponential time."""
 _PROSE_WORDS = word_set("and or for if as so let we now is at on in by of to the not all are")
@@ -106,7 +127,10 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
             problem = "a row that begins with a sign and has an = of its own"
         if goes_on and held[0].column > row.column:
             problem = "a row that may go on with either of two equations"
-            row_statements = [replace(statement, problem=statement.problem or problem) for statement in row_statements]
+            row_statements = [
+                replace(statement, problem=statement.problem or problem)
+                for statement in row_statements
+            ]
         if held and not goes_on:
             is_aside = _ends_statement(held[-1].text) and bool(_places(plain, _OTHER_RELATIONS))
             if not has_relation(plain) and not is_aside:
@@ -142,7 +166,9 @@ def _without_words(text: str) -> str:
 
     def separator(match: re.Match[str]) -> str:
         is_outside = match.start() in outside
-        is_kept = _is_part(match, text) or (_is_doubtful(match, text) if is_outside else _SYMMETRIC.match(match[0]))
+        is_kept = _is_part(match, text) or (
+            _is_doubtful(match, text) if is_outside else _SYMMETRIC.match(match[0])
+        )
         return match[0] if is_kept else r" \quad\therefore "
 
     return _WORDS.sub(separator, text)
@@ -153,7 +179,9 @@ def _is_part(match: re.Match[str], text: str) -> bool:
     inside = match[1].strip()
     if re.fullmatch(r"[A-Za-z]{1,3}\d*", inside, re.ASCII):
         return inside.lower() not in _PROSE_WORDS
-    is_behind_number = re.search(r"\d(?:[~\s]|\\[,;: ])*$", text[max(0, match.start() - 20) : match.start()])
+    is_behind_number = re.search(
+        r"\d(?:[~\s]|\\[,;: ])*$", text[max(0, match.start() - 20) : match.start()]
+    )
     return _UNIT.fullmatch(inside) is not None and is_behind_number is not None
 
 
@@ -187,7 +215,9 @@ def _bare(text: str) -> str:
         start = match.end()
     while end > start:
         mark = next((mark for mark in _TRAILING if text.endswith(mark, start, end)), "")
-        is_delimiter = mark in (",", ";", ".") and text.endswith(("\\left.", "\\right."), start, end)
+        is_delimiter = mark in (",", ";", ".") and text.endswith(
+            ("\\left.", "\\right."), start, end
+        )
         if not mark or is_delimiter:
             break
         end -= len(mark)
@@ -217,7 +247,10 @@ def _is_ambiguous(row: Row) -> bool:
 
 
 def _ends_statement(text: str) -> bool:
-    return re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-BOUNDS.row_ending_characters :]) is not None
+    return (
+        re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-BOUNDS.row_ending_characters :])
+        is not None
+    )
 
 
 def _nesting(bracket: re.Match[str]) -> int:
@@ -267,7 +300,9 @@ def _statements_of_rows(rows: Sequence[Row], problem: str) -> list[Statement]:
         is_whole = has_relation(part) and not STARTS_WITH_RELATION.match(bare_part)
         if not is_whole and statements and not _places(part, _OTHER_RELATIONS):
             why = words + bare_part[:60]
-            statements[refused:] = [replace(s, problem=s.problem or why) for s in statements[refused:]]
+            statements[refused:] = [
+                replace(s, problem=s.problem or why) for s in statements[refused:]
+            ]
             refused = len(statements)
         own = problem or (words + alone if alone else "")
         equations = [_bare(piece) for piece in _equations(part)]
@@ -281,7 +316,11 @@ def _equations(text: str) -> list[str]:
     first, *parts = _split(text, _places(text, re.compile(r"(?<!\\)[,;]")))
     equations = [first]
     for part in parts:
-        if has_relation(part) and has_relation(equations[-1]) and not STARTS_WITH_RELATION.match(part):
+        if (
+            has_relation(part)
+            and has_relation(equations[-1])
+            and not STARTS_WITH_RELATION.match(part)
+        ):
             equations.append(part)
         elif _bare(part):
             equations[-1] += "," + part
@@ -296,7 +335,11 @@ def _split(text: str, places: Sequence[tuple[int, int]]) -> list[str]:
 
 def _statement(text: str, line: int, problem: str) -> Statement:
     sides = [_bare(side) for side in _split(text, _places(text, _EQUAL))]
-    doubtful = [match[0] for match in _WORDS.finditer(text) if _is_doubtful(match, text) and not _is_part(match, text)]
+    doubtful = [
+        match[0]
+        for match in _WORDS.finditer(text)
+        if _is_doubtful(match, text) and not _is_part(match, text)
+    ]
     if not problem and sum(map(_nesting, _BRACKET.finditer(text))) != 0:
         problem = "brackets that do not close"
     if not problem and doubtful:

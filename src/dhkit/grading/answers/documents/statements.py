@@ -24,7 +24,8 @@ _LETTERS = GREEK | {"ell", "Tau", "mathbf"}
 """Macros that a name may be."""
 
 NAME = re.compile(
-    r"\[?(?P<letters>\\?[A-Za-z]+)\]?(?:_(?:(?P<one>[A-Za-z0-9])|\{(?P<below>[\\A-Za-z0-9, ]*)\}))?", re.ASCII
+    r"\[?(?P<letters>\\?[A-Za-z]+)\]?(?:_(?:(?P<one>[A-Za-z0-9])|\{(?P<below>[\\A-Za-z0-9, ]*)\}))?",
+    re.ASCII,
 )
 _ARGUMENT = re.compile(
     r"(?:\\d?dot|dot)?\{?(?:q|\\theta|\\vartheta|\\phi|\\varphi|\\Theta|theta|phi|x|y|z|t|d|r|qd|dq|qdd|th|qdot)\}?"
@@ -59,7 +60,9 @@ class Statement:
     text: str = ""
 
 
-def statement_of(line: int, sides: Sequence[str], names: Sequence[str], problem: str, text: str) -> Statement:
+def statement_of(
+    line: int, sides: Sequence[str], names: Sequence[str], problem: str, text: str
+) -> Statement:
     """Return a statement of its sides: M12 = M21 = f is about both names, V = a = f about V.
 
     Parameters
@@ -75,7 +78,9 @@ def statement_of(line: int, sides: Sequence[str], names: Sequence[str], problem:
     """
     if len(sides) == 1 or not names[0]:
         return Statement(line, (), tuple(sides), problem, text)
-    is_target = [_is_also(name, names[0]) for name in names[:-1]] + [False]  # the last side is a formula
+    is_target = [_is_also(name, names[0]) for name in names[:-1]] + [
+        False
+    ]  # the last side is a formula
     targets = dict.fromkeys(name for name, is_name in zip(names, is_target, strict=True) if is_name)
     formulas = tuple(side for side, is_name in zip(sides, is_target, strict=True) if not is_name)
     return Statement(line, tuple(targets), formulas, problem, text)
@@ -96,7 +101,9 @@ def left_hand_name(side: str) -> str:
     """
     if len(side) > BOUNDS.side_characters:
         return ""
-    text = re.sub(rf"{SPACE}+", " ", re.sub(r"\\(?:left|right|bigl?|bigr|Bigl?|Bigr)(?![A-Za-z])", "", side))
+    text = re.sub(
+        rf"{SPACE}+", " ", re.sub(r"\\(?:left|right|bigl?|bigr|Bigl?|Bigr)(?![A-Za-z])", "", side)
+    )
     styled = ""
     while styled != text:
         styled = text

@@ -49,7 +49,9 @@ _SAME_VALUES = 1e-9
 """Relative and absolute difference up to which two functions give the same numbers."""
 _KINDS = ("numpy", "sympy", "casadi")
 """Libraries that make the symbols, in the order in which they are tried."""
-_PARAMETER_SETS = frozenset(("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants"))
+_PARAMETER_SETS = frozenset(
+    ("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants")
+)
 """Names of an argument with the robot's parameters as fields."""
 _STATES = frozenset(("x", "y", "s", "state", "z", "X", "Y"))
 """Names of an argument with the joint variables and their rates, in the order that the task gives."""
@@ -93,17 +95,25 @@ def executed_answers(
         The program cannot be executed, or gives no answer.
     """
     if code.suffix not in RUNNERS:
-        raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
+        raise AnswerError(
+            f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb"
+        )
     if code.suffix == ".m":
         code = _functions_first(code)
-    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)[: BOUNDS.file_name_characters] + code.suffix
+    name = (
+        re.sub(r"\W", "_", path.stem, flags=re.ASCII)[: BOUNDS.file_name_characters] + code.suffix
+    )
     with tempfile.TemporaryDirectory(prefix="dhkit-answers-") as folder:
         source = Path(folder) / name
         source.write_text(code.text, "utf-8")
         child = Child(source, RUNNERS, _LIMITS, isolation)
         try:
             program = _ExecutedProgram(
-                child, Record(RobotNames(description, names), "**"), str(path), code.line_name, names
+                child,
+                Record(RobotNames(description, names), "**"),
+                str(path),
+                code.line_name,
+                names,
             )
             yield program.sheet()
         finally:
@@ -113,7 +123,10 @@ def executed_answers(
 def _functions_first(code: SourceCode) -> SourceCode:
     """Return a MATLAB file as a script with its functions in front: Octave knows them only after their definitions."""
     # A file begins in a new process; clear would take the runner's own names away.
-    lines = [re.sub(r"^\s*(?:clear|clearvars|clc|close)\b[^=(\n]*$", "", line) for line in code.text.split("\n")]
+    lines = [
+        re.sub(r"^\s*(?:clear|clearvars|clc|close)\b[^=(\n]*$", "", line)
+        for line in code.text.split("\n")
+    ]
     starts = [k for k, line in enumerate(lines) if re.match(r"\s*function\b", line)]
     if not starts:
         return replace(code, text="\n".join(lines))
@@ -148,7 +161,9 @@ class _ExecutedProgram:
         It cannot be executed.
     """
 
-    def __init__(self, child: Child, record: Record, file: str, line_name: Callable[[int], str], names: Names) -> None:
+    def __init__(
+        self, child: Child, record: Record, file: str, line_name: Callable[[int], str], names: Names
+    ) -> None:
         self.child = child
         self.record = record
         self.file = file
@@ -165,7 +180,11 @@ class _ExecutedProgram:
         try:
             first = child.start()
         except ProgramError as error:
-            hint = "; Octave needs its symbolic package (octave-symbolic)" if "'syms' undefined" in str(error) else ""
+            hint = (
+                "; Octave needs its symbolic package (octave-symbolic)"
+                if "'syms' undefined" in str(error)
+                else ""
+            )
             raise AnswerError(f"{file}: executed: {self.error_text(error)}{hint}") from None
         record.note(f"executed, {child.isolation}")
         self._lines = {name: _whole(number) for name, number in _fields(first.get("names"))}
@@ -195,7 +214,12 @@ class _ExecutedProgram:
             if not is_quantity and not robot.is_reserved(name):
                 continue
             value = self._value_of(name)
-            if robot.is_reserved(name) and isinstance(value, Scalar) and _is_constant(value) and name != "pi":
+            if (
+                robot.is_reserved(name)
+                and isinstance(value, Scalar)
+                and _is_constant(value)
+                and name != "pi"
+            ):
                 problem = problem or self._problem_of_number(name, value, where)
             if is_quantity:
                 self.main.set_argument(name, value, where)
@@ -249,11 +273,18 @@ class _ExecutedProgram:
         for kind in _KINDS if self.child.name.endswith(".py") and not self._ended else ():
             try:
                 answer = self.child.ask(
-                    {"call": function.name, "arguments": meaning, "as": kind, "locals": self._local_names(function)}
+                    {
+                        "call": function.name,
+                        "arguments": meaning,
+                        "as": kind,
+                        "locals": self._local_names(function),
+                    }
                 )
             except ProgramError as error:
                 problem = problem or self.error_text(error)
-                if error.failure is not Failure.RAISED:  # it hangs, or has ended: nothing else is called with symbols
+                if (
+                    error.failure is not Failure.RAISED
+                ):  # it hangs, or has ended: nothing else is called with symbols
                     self._ended = f"after {function.name}: {problem}"
                     raise UnreadError(f"{function.name}(...): {problem}") from None
                 continue
@@ -283,7 +314,9 @@ class _ExecutedProgram:
             return
         local = scope.names[own[0]].value
         are_scalars = isinstance(value, Scalar) and isinstance(local, Scalar)
-        are_alike = isinstance(value, Matrix) and isinstance(local, Matrix) and value.shape == local.shape
+        are_alike = (
+            isinstance(value, Matrix) and isinstance(local, Matrix) and value.shape == local.shape
+        )
         if (are_scalars or are_alike) and value != local:
             reason = f"{function.name} returns something else that it makes of {own[0]}, in {function.where}"
             scope.set_argument(own[0], Unread(reason), function.where)
@@ -291,12 +324,20 @@ class _ExecutedProgram:
     def local_quantities(self, function: Function) -> list[str]:
         """Return the local names of a function, its arguments aside, that are called like a quantity."""
         quantities = self.record.robot.quantities
-        return [name for name in function.definition if quantities.quantity(name) and name not in function.parameters]
+        return [
+            name
+            for name in function.definition
+            if quantities.quantity(name) and name not in function.parameters
+        ]
 
     def _local_names(self, function: Function) -> list[str]:
         """Return the local names of a function that may be quantities."""
         quantities = self.record.robot.quantities
-        return [name for name in function.definition if quantities.quantity(name) or quantities.entries(name)]
+        return [
+            name
+            for name in function.definition
+            if quantities.quantity(name) or quantities.entries(name)
+        ]
 
     @staticmethod
     def _with_names(value: Value, scope: Scope) -> Value:
@@ -338,7 +379,11 @@ class _ExecutedProgram:
             return {}
         if name in _TORQUES:
             return [f"torque{k + 1}" for k in range(robot.n)]
-        more = ', or a state whose order the task gives ([names] state = "q, qd")' if name in _STATES else ""
+        more = (
+            ', or a state whose order the task gives ([names] state = "q, qd")'
+            if name in _STATES
+            else ""
+        )
         found = f"the argument {name[:40]} of {function.name}"
         self.problems.append(f"{found} is not known; expected joint variables, parameters{more}")
         raise UnreadError(self.problems[-1])
@@ -366,7 +411,9 @@ class _ExecutedProgram:
         try:
             sheet = answers_of(self, self.file)
         except AnswerError:
-            sheet = AnswerSheet(names=Names(lenient=True), file=self.file, notes=tuple(self.record.notes))
+            sheet = AnswerSheet(
+                names=Names(lenient=True), file=self.file, notes=tuple(self.record.notes)
+            )
             sampled = self._sampled({})
             if not sampled and self.problems:
                 raise AnswerError(f"{self.file}: {self.problems[0]}") from None
@@ -399,11 +446,16 @@ class _ExecutedProgram:
                 if not quantity or is_given or quantity in in_main or quantities.is_parameter(name):
                     continue
                 before = found.get(quantity)
-                if local and (local in function.parameters or (before is not None and before.function is function)):
+                if local and (
+                    local in function.parameters
+                    or (before is not None and before.function is function)
+                ):
                     continue
                 one = _SampledFunction(self, function, local)
                 # Several functions may give a quantity; all must give the same.
-                found[quantity] = one if before is None else replace(before, others=(*before.others, one))
+                found[quantity] = (
+                    one if before is None else replace(before, others=(*before.others, one))
+                )
         return dict(found)
 
     def _in_main(self) -> set[str]:
@@ -412,7 +464,10 @@ class _ExecutedProgram:
         given = set()
         for name in self._lines:
             if not quantities.is_parameter(name):
-                given |= {quantities.quantity(name), *(target.quantity for target in quantities.entries(name))}
+                given |= {
+                    quantities.quantity(name),
+                    *(target.quantity for target in quantities.entries(name)),
+                }
         return given - {""}
 
 
@@ -438,7 +493,9 @@ class _SampledFunction(SampledAnswer):
         if any(name in _PARAMETER_SETS for name in names):
             return frozenset(robot.quantities.parameters.values())
         plain = map(plain_name, names)
-        return frozenset(robot.quantities.parameters[x] for x in plain if x in robot.quantities.parameters)
+        return frozenset(
+            robot.quantities.parameters[x] for x in plain if x in robot.quantities.parameters
+        )
 
     def at(self, states: Sequence[Mapping[str, float]], shape: tuple[int, ...]) -> Array:
         """Return its values at states, shape (states, *shape); see :class:`SampledAnswer`."""
@@ -446,7 +503,9 @@ class _SampledFunction(SampledAnswer):
         for other in self.others:
             if not _are_same(other._own_values(states, shape), values):
                 raise AnswerError(f"{self.name} and {other.name} give different values; keep one")
-        if self.local and self.program.child.name.endswith(".py"):  # of Octave's functions the locals are the results
+        if self.local and self.program.child.name.endswith(
+            ".py"
+        ):  # of Octave's functions the locals are the results
             self._refuse_changed(states, values)
         return values
 
@@ -459,7 +518,9 @@ class _SampledFunction(SampledAnswer):
         except AnswerError:
             return  # it returns another shape: the quantity is a step of its own
         if not _are_same(returned, values):
-            raise AnswerError(f"{self.function.name} returns something else that it makes of {self.local}")
+            raise AnswerError(
+                f"{self.function.name} returns something else that it makes of {self.local}"
+            )
 
     def _own_values(self, states: Sequence[Mapping[str, float]], shape: tuple[int, ...]) -> Array:
         """Return the values of this function alone, at random times and torques: no quantity depends on them."""
@@ -473,7 +534,8 @@ class _SampledFunction(SampledAnswer):
             samples.append({name: _numbers_of(key, numbers) for name, key in keys.items()})
         try:
             answer = self.program.child.ask(
-                {"call": self.function.name, "samples": samples, "local": self.local}, _SAMPLING_TIME
+                {"call": self.function.name, "samples": samples, "local": self.local},
+                _SAMPLING_TIME,
             )
         except ProgramError as error:
             raise AnswerError(f"{self.name}: {self.program.error_text(error)}") from None
@@ -490,7 +552,10 @@ class _SampledFunction(SampledAnswer):
         """Return the names in a state of an argument's numbers, in the structure of the argument."""
         symbols = self.program.symbols(name, self.function)
         if isinstance(symbols, dict):
-            return {parameter: parameter for parameter in self.program.record.robot.quantities.parameters.values()}
+            return {
+                parameter: parameter
+                for parameter in self.program.record.robot.quantities.parameters.values()
+            }
         if isinstance(symbols, list):
             return [self._key(one, known) for one in symbols]
         return self._key(str(symbols), known)
@@ -505,7 +570,9 @@ class _SampledFunction(SampledAnswer):
             return parameter
         meaning = robot.find(symbol)
         if meaning is None or len(meaning) != 1 or meaning[0] not in known:
-            raise AnswerError(f"{self.name}: the argument {symbol[:40]} is not a single joint variable")
+            raise AnswerError(
+                f"{self.name}: the argument {symbol[:40]} is not a single joint variable"
+            )
         return meaning[0]
 
 
@@ -532,7 +599,11 @@ def _fields(value: object) -> list[tuple[str, Any]]:
     """Return the fields of an object; none of anything else."""
     if not isinstance(value, dict):
         return []
-    return [(name, one) for name, one in list(value.items())[: BOUNDS.executed_names] if _is_identifier(name)]
+    return [
+        (name, one)
+        for name, one in list(value.items())[: BOUNDS.executed_names]
+        if _is_identifier(name)
+    ]
 
 
 def _listed(value: object) -> list[dict[str, Any]]:
@@ -552,7 +623,9 @@ def _texts(value: object) -> tuple[str, ...]:
 
 
 def _whole(value: object) -> int:
-    return value if isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**7 else 0
+    return (
+        value if isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**7 else 0
+    )
 
 
 def _function(one: Mapping[str, Any], line_name: Callable[[int], str]) -> Function:
@@ -579,7 +652,9 @@ def _without_advice(answer: object) -> object:
 def _renamed(text: str, names: Mapping[str, str]) -> str:
     if not names:
         return text
-    return re.sub(r"\bcasadi\d+\b", lambda match: names.get(match[0], match[0]), text, flags=re.ASCII)
+    return re.sub(
+        r"\bcasadi\d+\b", lambda match: names.get(match[0], match[0]), text, flags=re.ASCII
+    )
 
 
 def _is_constant(value: Scalar) -> bool:
@@ -602,7 +677,9 @@ def _value_of_tree(tree: object, names: Mapping[str, str], depth: int = 0) -> Va
                 return Unread(f"a list of more than {BOUNDS.list_values} values")
             return _value_of_list([_value_of_tree(row, names, depth + 1) for row in rows])
         case {"fields": dict(fields)}:
-            return Structure({name: _value_of_tree(one, names, depth + 1) for name, one in _fields(fields)})
+            return Structure(
+                {name: _value_of_tree(one, names, depth + 1) for name, one in _fields(fields)}
+            )
         case {"error": error}:
             return Unread(" ".join(printable(str(error)).split())[:300])
     return Unread("no formula and no numbers")

@@ -68,7 +68,9 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
     match function, arguments:
         case ("zeros", [Several(())]):  # zeros((*q.shape[:-1],)): one number a state
             return Matrix({}, is_zeros=True)
-        case ("zeros", [Scalar() as n]) if not of_numpy and n.text.isdecimal():  # sympy's and MATLAB's are square
+        case ("zeros", [Scalar() as n]) if (
+            not of_numpy and n.text.isdecimal()
+        ):  # sympy's and MATLAB's are square
             return zeros(int(n.text[:6]), int(n.text[:6]))
         case ("zeros", _) if arguments:
             return zeros(*_shape_of(arguments), multiplies_entries=of_numpy)
@@ -122,7 +124,9 @@ def flat(value: Value) -> Value:
     if isinstance(value, Matrix) and not value.is_flat:
         if 1 not in value.shape:
             raise UnreadError("a matrix made flat is not read")
-        return vector_of(list(chain.from_iterable(value.rows)), multiplies_entries=value.multiplies_entries)
+        return vector_of(
+            list(chain.from_iterable(value.rows)), multiplies_entries=value.multiplies_entries
+        )
     return unchanged(value)
 
 
@@ -149,7 +153,11 @@ def _shape_of(arguments: Sequence[Value]) -> tuple[int, ...]:
 
 def _rational(arguments: Sequence[Value]) -> Scalar:
     """Return Rational(1, 2), whose arguments have to be numbers as they stand."""
-    numbers = [x for x in arguments if isinstance(x, Scalar) and x.text.lstrip("-").replace(".", "", 1).isdecimal()]
+    numbers = [
+        x
+        for x in arguments
+        if isinstance(x, Scalar) and x.text.lstrip("-").replace(".", "", 1).isdecimal()
+    ]
     if len(numbers) != len(arguments) or not 1 <= len(numbers) <= 2:
         raise UnreadError("Rational(...) of anything but whole numbers is not read")
     if len(numbers) == 1:

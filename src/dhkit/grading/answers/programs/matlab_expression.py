@@ -34,7 +34,15 @@ from dhkit.grading.answers.programs.values import (
 from dhkit.grading.answers.tokens import rate_name, word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
-FUNCTIONS = frozenset(FUNCTION_NAMES) - {"square", "pow", "S", "Float", "Integer", "Rational", "number"}
+FUNCTIONS = frozenset(FUNCTION_NAMES) - {
+    "square",
+    "pow",
+    "S",
+    "Float",
+    "Integer",
+    "Rational",
+    "number",
+}
 """Functions of numbers; the names left out are sympy's and numpy's."""
 
 _OTHER_FUNCTIONS = word_set(
@@ -47,7 +55,9 @@ _SUMS = ("+", "-", ".+", ".-")
 _PRODUCTS = ("*", "/", ".*", "./")
 _INDEX_DIGITS = 5
 """Largest number of digits of an index."""
-_FIRST_ARGUMENT_ONLY = frozenset(["simplify", "vpa", "expand", "collect", "combine", "simplifyFraction"])
+_FIRST_ARGUMENT_ONLY = frozenset(
+    ["simplify", "vpa", "expand", "collect", "combine", "simplifyFraction"]
+)
 """Functions whose value is that of their first argument; the others say how it is written."""
 _POWERS = {"^": "^", "**": "^", ".^": ".^", ".**": ".^"}
 
@@ -99,7 +109,11 @@ class MatlabExpression:
     def _operand(self, value: Value) -> Value:
         """Return a value as an operand: q as the column of its entries, 1 x 1 as a scalar, a flat vector as a row."""
         robot = self.program.record.robot
-        if isinstance(value, Given) and not robot.vocabulary.knows(value.name) and robot.is_vector(value.name):
+        if (
+            isinstance(value, Given)
+            and not robot.vocabulary.knows(value.name)
+            and robot.is_vector(value.name)
+        ):
             entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in range(robot.n)]
             return matrix_of([[entry] for entry in entries])
         if isinstance(value, Matrix):
@@ -157,7 +171,9 @@ class MatlabExpression:
     def primary(self) -> Value:
         """Read a number, a text, a name with its suffixes, or brackets."""
         if self.at >= len(self.tokens):
-            raise UnreadError(f"{text_of(self.tokens)[:40]!r} ends where a number or a name was expected")
+            raise UnreadError(
+                f"{text_of(self.tokens)[:40]!r} ends where a number or a name was expected"
+            )
         token = self.tokens[self.at]
         self.at += 1
         match token.kind, token.text:
@@ -223,8 +239,14 @@ class MatlabExpression:
     def _called(self, name: str) -> Value:
         """Return the function of a library, or the value, that a name in front of brackets stands for."""
         is_library = name in FUNCTIONS or name in _OTHER_FUNCTIONS
-        if is_library and name not in self.program.assigned_names and self.scope.owner(name) is None:
-            self.scope.value(name)  # notes that the name is read, so that binding it later is refused
+        if (
+            is_library
+            and name not in self.program.assigned_names
+            and self.scope.owner(name) is None
+        ):
+            self.scope.value(
+                name
+            )  # notes that the name is read, so that binding it later is refused
             return Library(name)
         return self.scope.value(name)
 
@@ -251,12 +273,19 @@ class MatlabExpression:
         if index is None:
             index = self._index_by_names(inside)
         if index is not None:
-            if isinstance(value, Matrix) and len(index) == 1 and not value.is_flat and 1 not in value.shape:
+            if (
+                isinstance(value, Matrix)
+                and len(index) == 1
+                and not value.is_flat
+                and 1 not in value.shape
+            ):
                 raise UnreadError(f"one index into the matrix {name} is not read")
             return self.scope.entry(value, index)
         places = [_places(part) for part in arguments_of(inside)]
         match value, places:
-            case Given(vector, number=call), [range() as one] if not self.program.record.robot.vocabulary.knows(vector):
+            case Given(vector, number=call), [range() as one] if (
+                not self.program.record.robot.vocabulary.knows(vector)
+            ):
                 if one:
                     return Part(vector, tuple(one), is_slice=True, number=call)
             case Matrix(), [rows, columns] if not value.is_flat:
@@ -265,7 +294,9 @@ class MatlabExpression:
                 column_places = _places_within(columns, n)
                 if row_places is not None and column_places is not None:
                     return matrix_of(value.part(row_places, column_places))
-            case Matrix(), [range() as one] if one and (value.is_flat or 1 in value.shape):  # v(1:2)
+            case Matrix(), [range() as one] if one and (
+                value.is_flat or 1 in value.shape
+            ):  # v(1:2)
                 entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in one]
                 # A vector that was assigned entry by entry is a row in MATLAB.
                 is_row = value.is_flat or value.shape[0] == 1
@@ -297,7 +328,9 @@ class MatlabExpression:
             return self._symbol(inside, text)
         arguments = [self.program.value(part, self.scope) for part in arguments_of(inside)]
         if function in ("zeros", "eye") and len(arguments) == 1:
-            arguments = [*arguments, *arguments] if not isinstance(arguments[0], Matrix) else arguments
+            arguments = (
+                [*arguments, *arguments] if not isinstance(arguments[0], Matrix) else arguments
+            )
         if function in _FIRST_ARGUMENT_ONLY:
             arguments = arguments[:1]
         arguments = [x if isinstance(x, Matrix) else self.scope.scalar(x) for x in arguments]
@@ -312,7 +345,9 @@ class MatlabExpression:
             self.scope.key_of(name)
         value = self.scope.value(match[1])
         if isinstance(value, Given) and value.is_constant:
-            raise UnreadError(f"diff({text[:40]}): {match[1]} is a symbol and no function of t: its derivative is 0")
+            raise UnreadError(
+                f"diff({text[:40]}): {match[1]} is a symbol and no function of t: its derivative is 0"
+            )
         name = ""
         if isinstance(value, Given):
             name = value.name
@@ -328,7 +363,9 @@ class MatlabExpression:
             known = rate_name(base, "dot" if order + own_order == 1 else "ddot")
             if vocabulary.is_position(base) and vocabulary.is_state(known):
                 return with_use(self.scope.known(known), self.scope.key_of(match[1]))
-        raise UnreadError(f"diff({text[:40]}): {name} is the program's own name, of which no rate is read")
+        raise UnreadError(
+            f"diff({text[:40]}): {name} is the program's own name, of which no rate is read"
+        )
 
     def _symbol(self, inside: Tokens, text: str) -> Value:
         """Return the symbol of sym('q1', 'real'), the number of sym(1/3), and the vector of sym('q', [2 1])."""
@@ -347,7 +384,9 @@ class MatlabExpression:
             text = quoted
         elif inside:
             value = self.program.value(inside, self.scope)
-            if isinstance(value, Matrix) or (isinstance(value, Scalar) and value.number is not None):
+            if isinstance(value, Matrix) or (
+                isinstance(value, Scalar) and value.number is not None
+            ):
                 return value
         match = re.fullmatch(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?", text, re.ASCII)
         if match is None:
@@ -360,7 +399,9 @@ def with_use(value: Value, key: str) -> Value:
     if isinstance(value, Scalar):
         return replace(value, uses=value.uses | {key})
     if isinstance(value, Matrix):
-        return replace(value, entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()})
+        return replace(
+            value, entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()}
+        )
     if isinstance(value, Several):
         return replace(value, values=tuple(with_use(one, key) for one in value.values))
     return value

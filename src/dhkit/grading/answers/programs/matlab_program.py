@@ -53,7 +53,9 @@ from dhkit.grading.answers.tokens import word_set
 _BLOCK_BEGINNINGS = word_set(
     "if for while switch try parfor spmd unwind_protect do classdef methods properties events enumeration"
 )
-_BLOCK_BRANCHES = frozenset(["else", "elseif", "case", "otherwise", "catch", "unwind_protect_cleanup"])
+_BLOCK_BRANCHES = frozenset(
+    ["else", "elseif", "case", "otherwise", "catch", "unwind_protect_cleanup"]
+)
 _BLOCK_ENDS = word_set(
     "end endif endfor endwhile endswitch end_try_catch endfunction endparfor end_unwind_protect until"
 )
@@ -86,7 +88,9 @@ _SYNTAX = word_set(
 )
 """Functions that signs and brackets of formulas stand for, those that make symbols, and words of expressions."""
 
-_ASSUMPTIONS = frozenset(["real", "positive", "integer", "rational", "clear", "nonnegative", "matrix"])
+_ASSUMPTIONS = frozenset(
+    ["real", "positive", "integer", "rational", "clear", "nonnegative", "matrix"]
+)
 """Words that may follow the names of ``syms``."""
 
 
@@ -119,7 +123,9 @@ class MatlabProgram:
         The text is not MATLAB, or has more statements than are read, or one that may change any name.
     """
 
-    def __init__(self, text: str, file: str, line_name: Callable[[int], str], record: Record) -> None:
+    def __init__(
+        self, text: str, file: str, line_name: Callable[[int], str], record: Record
+    ) -> None:
         if "\0" in text:
             raise AnswerError(f"{file}: not MATLAB: a NUL character")
         self.file = file
@@ -147,14 +153,18 @@ class MatlabProgram:
         for statement in statements:
             self.assigned_names |= statement.assigned_names()
             if statement.keyword == "function":
-                self.signature_names |= {token.text for token in statement.tokens if token.kind == "name"}
+                self.signature_names |= {
+                    token.text for token in statement.tokens if token.kind == "name"
+                }
         for statement in statements:
             self._refuse_other_code(statement)
         try:
             main = self._without_functions(statements)
             self._read_statements(main, self.main)
         except RecursionError:
-            raise AnswerError(f"{file}: nested too deep to be read; write long sums in parts") from None
+            raise AnswerError(
+                f"{file}: nested too deep to be read; write long sums in parts"
+            ) from None
 
     def _refusal(self, statement: MatlabStatement, what: str, expected: str = "") -> AnswerError:
         more = f"; expected {expected}" if expected else ""
@@ -174,8 +184,13 @@ class MatlabProgram:
                     f"found {token.text!r}, which may change any name; a program is read, not run (--execute)",
                 )
         # ``load = 2`` assigns a name, ``load data`` is a command.
-        if statement.keyword in _RUNS_OTHER_CODE and statement.keyword not in statement.assigned_names():
-            raise self._refusal(statement, f"found {statement.keyword!r}, which may change any name")
+        if (
+            statement.keyword in _RUNS_OTHER_CODE
+            and statement.keyword not in statement.assigned_names()
+        ):
+            raise self._refusal(
+                statement, f"found {statement.keyword!r}, which may change any name"
+            )
 
     # Functions
 
@@ -197,7 +212,9 @@ class MatlabProgram:
             k = end + 1 if has_ends else end
         return main
 
-    def _end_of_function(self, statements: Sequence[MatlabStatement], start: int, *, has_ends: bool) -> int:
+    def _end_of_function(
+        self, statements: Sequence[MatlabStatement], start: int, *, has_ends: bool
+    ) -> int:
         """Return the index of a function's own end, or of the next function where functions have none."""
         depth = 0
         for k in range(start + 1, len(statements)):
@@ -205,7 +222,9 @@ class MatlabProgram:
             if word == "function":
                 if has_ends:
                     raise self._refusal(
-                        statements[k], "found a function inside a function or a block", "functions side by side"
+                        statements[k],
+                        "found a function inside a function or a block",
+                        "functions side by side",
                     )
                 return k
             if word in _BLOCK_ENDS:
@@ -239,9 +258,13 @@ class MatlabProgram:
             raise self._refusal(statement, "found a function without a name")
         name = right[0].text
         if name in _SYNTAX:
-            raise self._refusal(statement, f"found a function {name!r}, which changes what formulas mean")
+            raise self._refusal(
+                statement, f"found a function {name!r}, which changes what formulas mean"
+            )
         if any(token.text == "=" for token in right[1:]):
-            raise self._refusal(statement, "found a default of an argument", "arguments by name alone")
+            raise self._refusal(
+                statement, "found a default of an argument", "arguments by name alone"
+            )
         parameters = tuple(token.text for token in right[1:] if token.kind == "name")
         where = self.line_name(statement.line)
         function = Function(name, parameters, _Definition(tuple(body), results), where)
@@ -252,7 +275,9 @@ class MatlabProgram:
 
     def arguments_as_given(self, function: Function) -> dict[str, Value]:
         """Return a function's arguments as themselves."""
-        values: dict[str, Value] = {name: self.record.argument(name) for name in function.parameters}
+        values: dict[str, Value] = {
+            name: self.record.argument(name) for name in function.parameters
+        }
         if function.name in function.definition.results:  # ``applied`` refuses it
             values = {}
         for name in set(function.definition.results) & set(values):
@@ -270,7 +295,9 @@ class MatlabProgram:
             The function is not read.
         """
         if function.name in function.definition.results:
-            raise UnreadError(f"{function.name} is the name of a function and of its result, in {function.where}")
+            raise UnreadError(
+                f"{function.name} is the name of a function and of its result, in {function.where}"
+            )
         if self.depth >= BOUNDS.call_depth:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         definition: _Definition = function.definition
@@ -311,7 +338,12 @@ class MatlabProgram:
         formula = function.definition.formula  # empty for a function
         for k, token in enumerate(formula):
             is_field = k > 0 and formula[k - 1].text == "."
-            if token.kind == "name" and not is_field and token.text in self.assigned_names and token.text not in known:
+            if (
+                token.kind == "name"
+                and not is_field
+                and token.text in self.assigned_names
+                and token.text not in known
+            ):
                 raise UnreadError(
                     f"{token.text} is assigned after the handle of {function.where}, which does not see it"
                 )
@@ -320,15 +352,24 @@ class MatlabProgram:
     def returned_names(function: Function) -> list[str]:
         """Return the names in a function's results."""
         definition: _Definition = function.definition
-        return [*definition.results, *(token.text for token in definition.formula if token.kind == "name")]
+        return [
+            *definition.results,
+            *(token.text for token in definition.formula if token.kind == "name"),
+        ]
 
-    def _without_defaults(self, statements: Sequence[MatlabStatement], function: Function) -> list[MatlabStatement]:
+    def _without_defaults(
+        self, statements: Sequence[MatlabStatement], function: Function
+    ) -> list[MatlabStatement]:
         """Leave out ``if nargin < 2, p = NAME_parameters(); end``, with which `dhkit equations` gives p a default."""
         kept: list[MatlabStatement] = []
         k = 0
         while k < len(statements):
             match [statement.texts for statement in statements[k : k + 3]]:
-                case [["if", "nargin", "<", count], [argument, "=", default, "(", ")"], ["end"]] if (
+                case [
+                    ["if", "nargin", "<", count],
+                    [argument, "=", default, "(", ")"],
+                    ["end"],
+                ] if (
                     argument in function.parameters
                     and count.isdecimal()
                     and int(count[:4]) <= len(function.parameters)
@@ -363,11 +404,19 @@ class MatlabProgram:
                 self._break(statement, scope, repr(word), where)
             elif word == "return":
                 if scope is self.main:
-                    raise self._refusal(statement, "found 'return' outside a function", "statements that are all run")
+                    raise self._refusal(
+                        statement,
+                        "found 'return' outside a function",
+                        "statements that are all run",
+                    )
                 has_returned = True
                 if blocks:  # the statements after it may not be run
                     for name in scope.local:
-                        scope.change(name, f"{name} may be changed by 'return' in {where}", only_matrices=False)
+                        scope.change(
+                            name,
+                            f"{name} may be changed by 'return' in {where}",
+                            only_matrices=False,
+                        )
             elif blocks or has_returned:
                 what = repr(blocks[-1]) if blocks else "a statement after 'return'"
                 self._refuse_script(statement, word)
@@ -385,7 +434,9 @@ class MatlabProgram:
         known = {*_KNOWN_WORDS, *self.assigned_names, *self.signature_names}
         if len(statement.tokens) == 1 and word and word not in known:
             raise self._refusal(
-                statement, f"found {word!r}, which may be a script that changes any name", "assignments"
+                statement,
+                f"found {word!r}, which may be a script that changes any name",
+                "assignments",
             )
 
     def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
@@ -395,20 +446,28 @@ class MatlabProgram:
             for name in sorted(statement.assigned_names() | statement.assigned_fields()):
                 yield name, where
 
-    def _read_statement(self, statement: MatlabStatement, word: str, scope: Scope, where: str) -> None:
+    def _read_statement(
+        self, statement: MatlabStatement, word: str, scope: Scope, where: str
+    ) -> None:
         """Read a statement outside blocks: ``global``, ``clear``, ``syms``, an assignment, a change or a command."""
         tokens = statement.tokens
         equals = [k for k, token in enumerate(tokens) if token.is_sign("=")]
         depths = list(accumulate(token.nesting for token in tokens))
         assigning = next((k for k in equals if depths[k] == 0), None)
         changing = next((k for k, token in enumerate(tokens) if token.is_sign(*CHANGING)), None)
-        is_change = changing is not None or tokens[0].text in STEPPING or tokens[-1].text in STEPPING
+        is_change = (
+            changing is not None or tokens[0].text in STEPPING or tokens[-1].text in STEPPING
+        )
         if word in ("global", "persistent"):
             for name in statement.command_names:
-                scope.change(name, f"{name[:40]} is changed by {word!r} in {where}", only_matrices=False)
+                scope.change(
+                    name, f"{name[:40]} is changed by {word!r} in {where}", only_matrices=False
+                )
         elif word in ("clear", "clearvars"):
             named = [name for name in statement.command_names if name in scope.names]
-            variables = [name for name, one in scope.names.items() if not isinstance(one.value, Function)]
+            variables = [
+                name for name, one in scope.names.items() if not isinstance(one.value, Function)
+            ]
             for name in named if statement.command_names else variables:
                 scope.change(name, f"{name[:40]} is cleared in {where}", only_matrices=False)
         elif word == "syms":
@@ -419,7 +478,12 @@ class MatlabProgram:
             self._assign(statement, tokens[:assigning], tokens[assigning + 1 :], scope, where)
         elif is_change:
             name, index = _target(tokens[: changing or 0])
-            if changing is not None and tokens[changing].text == "+=" and name and index is not None:
+            if (
+                changing is not None
+                and tokens[changing].text == "+="
+                and name
+                and index is not None
+            ):
                 self._assign_entry(name, index, tokens[changing + 1 :], scope, where, is_added=True)
             else:
                 self._break(statement, scope, "an assignment that changes it", where)
@@ -437,11 +501,17 @@ class MatlabProgram:
             if shape:
                 lengths = [int(k) for k in re.findall(r"\d{1,3}", shape)]
                 if len(lengths) != 2 or min(lengths) != 1:
-                    scope.change(name, f"{name[:40]} is made by 'syms' of a matrix in {where}", only_matrices=False)
+                    scope.change(
+                        name,
+                        f"{name[:40]} is made by 'syms' of a matrix in {where}",
+                        only_matrices=False,
+                    )
                     continue
                 scope.bind(name, self._symbols(name, lengths, scope, where), where)
             elif arguments and arguments.replace(" ", "") != "(t)":
-                reason = f"{name[:40]} is made by 'syms' of a function of other names than t in {where}"
+                reason = (
+                    f"{name[:40]} is made by 'syms' of a function of other names than t in {where}"
+                )
                 scope.change(name, reason, only_matrices=False)
             else:
                 scope.bind(name, Given(name, is_symbol=True, is_constant=not arguments), where)
@@ -454,7 +524,9 @@ class MatlabProgram:
         scalars = [Scalar(one, uses=frozenset((scope.key(one),))) for one in names]
         return row_or_column(scalars, is_column=lengths[0] > 1)
 
-    def _assign(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, where: str) -> None:
+    def _assign(
+        self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, where: str
+    ) -> None:
         """Read ``[M, C] = f(q)``, ``V(q1, q2) = x``, ``M(1, :) = x``, ``M(1, 2) = x``, ``V = x`` and ``p.m1 = x``."""
         if not left:
             self._break(statement, scope, "an assignment without a name", where)
@@ -488,11 +560,17 @@ class MatlabProgram:
         # A field, too, is assigned once.
         structure, _, member = name.partition(".")
         binding = scope.names.get(structure)
-        fields = dict(binding.value.fields) if binding is not None and isinstance(binding.value, Structure) else {}
+        fields = (
+            dict(binding.value.fields)
+            if binding is not None and isinstance(binding.value, Structure)
+            else {}
+        )
         if binding is not None and not isinstance(binding.value, Structure | Given):
             scope.change(structure, f"{structure[:40]} is changed in {where}", only_matrices=False)
         elif member in fields and fields[member] != value:
-            scope.change(structure, f"{name[:40]} is assigned twice, in {where}", only_matrices=False)
+            scope.change(
+                structure, f"{name[:40]} is assigned twice, in {where}", only_matrices=False
+            )
         else:
             scope.set_argument(structure, Structure({**fields, member: value}), where)
 
@@ -506,7 +584,11 @@ class MatlabProgram:
         names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
         values: Sequence[Value] = ()
         try:
-            if is_call(right, "deal") and "deal" not in self.own.names and "deal" not in self.assigned_names:
+            if (
+                is_call(right, "deal")
+                and "deal" not in self.own.names
+                and "deal" not in self.assigned_names
+            ):
                 values = [self.value(x, scope) for x in arguments_of(right[2:-1])]
             else:
                 value = self.value(right, scope, "", count=len(names))
@@ -527,10 +609,18 @@ class MatlabProgram:
             return False
         arguments = [entry[0].text if len(entry) == 1 else "" for entry in arguments_of(left[2:-1])]
         bindings = [scope.names.get(name) for name in arguments]
-        return all(one is not None and isinstance(one.value, Given) and one.value.is_symbol for one in bindings)
+        return all(
+            one is not None and isinstance(one.value, Given) and one.value.is_symbol
+            for one in bindings
+        )
 
     def _assign_row_or_column(
-        self, name: str, place: tuple[int | None, int | None], right: Tokens, scope: Scope, where: str
+        self,
+        name: str,
+        place: tuple[int | None, int | None],
+        right: Tokens,
+        scope: Scope,
+        where: str,
     ) -> None:
         """Read ``M(1, :) = [a b]``: an entry for each number of the vector."""
         row, column = place
@@ -554,7 +644,13 @@ class MatlabProgram:
             scope.bind_entry(name, (i, j), entry, where)
 
     def _assign_entry(
-        self, name: str, index: Index, right: Tokens, scope: Scope, where: str, is_added: bool = False
+        self,
+        name: str,
+        index: Index,
+        right: Tokens,
+        scope: Scope,
+        where: str,
+        is_added: bool = False,
     ) -> None:
         """Read ``M(1, 2) = ...``; ``is_added`` where the value is added to the entry."""
         binding = scope.names.get(name)
@@ -617,7 +713,9 @@ class MatlabProgram:
                     captured[token.text] = Unread(str(error))
         return Function(name, parameters, _Definition(formula=formula), where, captured=captured)
 
-    def call(self, function: Function, arguments: Sequence[Value], scope: Scope, name: str, count: int) -> Value:
+    def call(
+        self, function: Function, arguments: Sequence[Value], scope: Scope, name: str, count: int
+    ) -> Value:
         """Return the value of a call of one of the program's functions."""
         if len(arguments) > len(function.parameters):
             raise UnreadError(f"{name}(...) is called with too many arguments")

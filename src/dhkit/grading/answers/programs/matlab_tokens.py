@@ -149,7 +149,12 @@ def _names_assigned_before(tokens: Tokens, end: int) -> set[str]:
             return {entry[0].text for entry in entries if entry[0].kind == "name"}
         if not is_list and depth < 0:
             return set()
-        if not is_list and depth == 0 and tokens[k].kind == "name" and (k == 0 or tokens[k - 1].text != "."):
+        if (
+            not is_list
+            and depth == 0
+            and tokens[k].kind == "name"
+            and (k == 0 or tokens[k - 1].text != ".")
+        ):
             return {tokens[k].text}
     return set()
 
@@ -182,7 +187,13 @@ def split_rows(tokens: Tokens) -> list[list[Tokens]]:
         if depth == 0 and token.is_sign(","):
             rows[-1].append([])
             continue
-        if depth == 0 and token.is_spaced and entry and entry[-1].ends_operand and _begins_entry(tokens[k : k + 2]):
+        if (
+            depth == 0
+            and token.is_spaced
+            and entry
+            and entry[-1].ends_operand
+            and _begins_entry(tokens[k : k + 2])
+        ):
             rows[-1].append([])
         depth += token.nesting
         rows[-1][-1].append(token)
@@ -200,10 +211,17 @@ def _begins_entry(tokens: Tokens) -> bool:
     after = tokens[1] if len(tokens) > 1 else None
     if token.kind != "sign" or token.text in ("(", "[", "{", "@"):
         return True
-    return token.text in ("+", "-", "~", "!") and after is not None and not after.is_spaced and after.kind != "row"
+    return (
+        token.text in ("+", "-", "~", "!")
+        and after is not None
+        and not after.is_spaced
+        and after.kind != "row"
+    )
 
 
-def matlab_statements(text: str, file: str, line_name: Callable[[int], str]) -> Iterator[MatlabStatement]:
+def matlab_statements(
+    text: str, file: str, line_name: Callable[[int], str]
+) -> Iterator[MatlabStatement]:
     """Yield the statements of a program.
 
     Parameters
@@ -245,7 +263,9 @@ class _Tokenizer:
                 continue
             tokens.append(token)
             if len(tokens) > BOUNDS.matlab_tokens:
-                raise self._error(tokens[0].line, f"a statement of more than {BOUNDS.matlab_tokens} signs")
+                raise self._error(
+                    tokens[0].line, f"a statement of more than {BOUNDS.matlab_tokens} signs"
+                )
         if self.brackets:
             sign, line = self.brackets[-1]
             raise self._error(line, f"{sign!r} does not close")
@@ -255,7 +275,9 @@ class _Tokenizer:
     def _tokens(self, text: str) -> Iterator[MatlabToken]:
         """Yield the tokens outside block comments."""
         depth = 0
-        for number, line_text in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
+        for number, line_text in enumerate(
+            text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1
+        ):
             mark = line_text.strip()
             if mark in ("%{", "#{"):
                 depth += 1
@@ -279,7 +301,9 @@ class _Tokenizer:
             if line_text[at] in "%#" or (line_text[at] == "!" and is_at_row):
                 break  # a comment, or a command of the system's
             if line_text.startswith("...", at):
-                self.previous = self.previous if self.brackets else MatlabToken("space", " ", number, True)
+                self.previous = (
+                    self.previous if self.brackets else MatlabToken("space", " ", number, True)
+                )
                 return
             begins_statement = is_at_row or (not self.brackets and self.previous.text in (";", ","))
             match = self._match(line_text, at, number, is_spaced)
@@ -289,7 +313,9 @@ class _Tokenizer:
             is_command = begins_statement and kind == "name" and text in COMMANDS
             rest = line_text[at:] if is_command else ""
             end = len(line_text) - len(_behind_words(rest))
-            token = MatlabToken(kind, text, number, is_spaced, line_text[at:end] if is_command else "")
+            token = MatlabToken(
+                kind, text, number, is_spaced, line_text[at:end] if is_command else ""
+            )
             self._count_bracket(token)
             yield token
             self.previous = token
@@ -318,7 +344,9 @@ class _Tokenizer:
         if token.nesting > 0:
             self.brackets.append((token.text, token.line))
         elif token.nesting < 0:
-            if not self.brackets or _OPENING.index(self.brackets[-1][0]) != _CLOSING.index(token.text):
+            if not self.brackets or _OPENING.index(self.brackets[-1][0]) != _CLOSING.index(
+                token.text
+            ):
                 raise self._error(token.line, f"{token.text!r} without its opening bracket")
             self.brackets.pop()
 
@@ -332,5 +360,7 @@ def _takes_words(rest: str) -> bool:
 def _behind_words(rest: str) -> str:
     """Return what follows a command's words in its line."""
     depths = accumulate((character in _OPENING) - (character in _CLOSING) for character in rest)
-    ends = (k for k, depth in enumerate(depths) if rest[k] in "%#" or (rest[k] in ";," and depth <= 0))
+    ends = (
+        k for k, depth in enumerate(depths) if rest[k] in "%#" or (rest[k] in ";," and depth <= 0)
+    )
     return rest[next(ends, len(rest)) :]

@@ -71,24 +71,34 @@ def notebook_code(text: str, file: str) -> Notebook:
     """
     try:
         document = json.loads(text)
-        language = str(document.get("metadata", {}).get("kernelspec", {}).get("language", "python")).lower()
+        language = str(
+            document.get("metadata", {}).get("kernelspec", {}).get("language", "python")
+        ).lower()
         cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
         sources = [_source(cell["source"]) for cell in cells]
         counts = [cell.get("execution_count") for cell in cells]
     except (ValueError, RecursionError):
         raise AnswerError(f"{file}: no notebook: not JSON") from None
     except (KeyError, TypeError, AttributeError):
-        raise AnswerError(f"{file}: no notebook: expected cells with cell_type and source") from None
+        raise AnswerError(
+            f"{file}: no notebook: expected cells with cell_type and source"
+        ) from None
     is_matlab = language in ("matlab", "octave")
     if not is_matlab and language not in ("python", "python3", ""):
-        raise AnswerError(f"{file}: a notebook of {language[:20]!r}; expected Python, MATLAB or Octave")
+        raise AnswerError(
+            f"{file}: a notebook of {language[:20]!r}; expected Python, MATLAB or Octave"
+        )
     lines: list[str] = []
     starts: list[int] = []
     for number, source in enumerate(sources, start=1):
         starts.append(len(lines) + 1)
         cell = source.replace("\r\n", "\n").replace("\r", "\n")
-        lines += (cell if is_matlab else _without_magics(cell, f"{file}: cell {number}")).split("\n")
-    return Notebook("\n".join(lines), ".m" if is_matlab else ".py", tuple(starts), _order_notes(counts))
+        lines += (cell if is_matlab else _without_magics(cell, f"{file}: cell {number}")).split(
+            "\n"
+        )
+    return Notebook(
+        "\n".join(lines), ".m" if is_matlab else ".py", tuple(starts), _order_notes(counts)
+    )
 
 
 def _source(source: object) -> str:
@@ -126,11 +136,15 @@ def _without_magics(cell: str, where: str) -> str:
             if magic[1] in _CELLS_WITHOUT_PYTHON:
                 return "\n".join("" for _ in lines)
             lines = _timed_or_captured(lines, first, magic[1], magic[2].split(), where)
-        cell = "\n".join(_executed(line, f"{where}, line {k}") for k, line in enumerate(lines, start=1))
+        cell = "\n".join(
+            _executed(line, f"{where}, line {k}") for k, line in enumerate(lines, start=1)
+        )
     try:
         _parse(cell)
     except SyntaxError as error:
-        raise AnswerError(f"{where}, line {error.lineno or 1}: no Python: {str(error.msg)[:100]}") from None
+        raise AnswerError(
+            f"{where}, line {error.lineno or 1}: no Python: {str(error.msg)[:100]}"
+        ) from None
     except (ValueError, RecursionError, MemoryError):
         raise AnswerError(f"{where}: no Python, or nested too deep to be read") from None
     return cell
@@ -143,7 +157,9 @@ def _without_indentation(cell: str) -> str:
     return "\n".join(line.removeprefix(indentation) for line in lines)
 
 
-def _timed_or_captured(lines: list[str], first: int, magic: str, arguments: list[str], where: str) -> list[str]:
+def _timed_or_captured(
+    lines: list[str], first: int, magic: str, arguments: list[str], where: str
+) -> list[str]:
     """Return a cell under a magic of the whole cell, whose code is executed, as the same number of lines."""
     rest = lines[first + 1 :]
     before = ["" for _ in lines[:first]]

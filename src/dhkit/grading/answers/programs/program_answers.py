@@ -141,7 +141,9 @@ class _ProgramAnswers:
                 answers[quantity] = answer
         record = self.record
         self._note_unjudged(answers)
-        return source_sheet(file, self.quantities.n, answers, self.parameters, record.notes, record.left_out)
+        return source_sheet(
+            file, self.quantities.n, answers, self.parameters, record.notes, record.left_out
+        )
 
     def _note_unjudged(self, answers: Iterable[str]) -> None:
         """Name the quantities that the program assigns where nothing is read, such as a branch or a class."""
@@ -154,11 +156,15 @@ class _ProgramAnswers:
                 continue
             noted.add(quantity)
             if not any(re.search(rf"\b{re.escape(name)}\b", text) for text in self.record.left_out):
-                self.record.left_out.append(f"{where}: {name} (assigned where the program is not read)")
+                self.record.left_out.append(
+                    f"{where}: {name} (assigned where the program is not read)"
+                )
 
     # The program's answers
 
-    def _given_by(self, scope: Scope, name: str, called: str, function: str = "") -> Iterator[_Candidate]:
+    def _given_by(
+        self, scope: Scope, name: str, called: str, function: str = ""
+    ) -> Iterator[_Candidate]:
         """Yield the quantity, or the entries, that a name gives that is called so."""
         binding = scope.names[name]
         value: Value = binding.value
@@ -167,8 +173,12 @@ class _ProgramAnswers:
         if isinstance(value, Given):
             value = self._of_given(scope, value, binding.where)
         if isinstance(value, Matrix) and not value.entries:
-            value = Unread(f"{name} is made of the states' shape and never filled, in {binding.where}")
-        one = _Candidate(Target("M"), binding.where, Unread(""), name, scope.key(name), function=function)
+            value = Unread(
+                f"{name} is made of the states' shape and never filled, in {binding.where}"
+            )
+        one = _Candidate(
+            Target("M"), binding.where, Unread(""), name, scope.key(name), function=function
+        )
         quantity = self.quantities.quantity(called)
         if quantity:
             yield from self._given_whole(
@@ -187,21 +197,31 @@ class _ProgramAnswers:
         except UnreadError as error:
             return Unread(f"{where}: {error}", frozenset((value.name,)))
 
-    def _given_entry(self, one: _Candidate, called: str, value: Scalar | Unread) -> Iterator[_Candidate]:
+    def _given_entry(
+        self, one: _Candidate, called: str, value: Scalar | Unread
+    ) -> Iterator[_Candidate]:
         entries = self.quantities.entries(called)
         is_own_name = self.record.robot.is_reserved(called)
         if not entries or is_own_name:
             return
-        if isinstance(value, Scalar) and value.is_name and self.record.robot.is_same(called, value.text):
+        if (
+            isinstance(value, Scalar)
+            and value.is_name
+            and self.record.robot.is_same(called, value.text)
+        ):
             return  # c12 = c12, and a symbol of the name of an entry
         if len(entries) > 1:
             readings = " or ".join(map(str, entries))
-            value = Unread(f"{called} in {one.where} may be {readings}; write it with a comma or an underscore")
+            value = Unread(
+                f"{called} in {one.where} may be {readings}; write it with a comma or an underscore"
+            )
             entries = [Target(entry.quantity) for entry in entries]
         for entry in entries:
             yield replace(one, target=entry, value=value, is_named_entry=entry.index is not None)
 
-    def _given_whole(self, one: _Candidate, quantity: str, called: str, value: Value) -> Iterator[_Candidate]:
+    def _given_whole(
+        self, one: _Candidate, quantity: str, called: str, value: Value
+    ) -> Iterator[_Candidate]:
         one = replace(one, target=Target(quantity))
         match value:
             case Unread():
@@ -211,10 +231,14 @@ class _ProgramAnswers:
                     self.record.left_out.append(f"{one.where}: {called} ({value.reason})")
             case Matrix() | Scalar():
                 if not self._fits(quantity, called, value, one.is_alias):
-                    if not self.record.robot.is_reserved(called) and not self._is_minor(quantity, value):
+                    if not self.record.robot.is_reserved(called) and not self._is_minor(
+                        quantity, value
+                    ):
                         self.record.left_out.append(f"{one.where}: {called} = {value.text[:60]}")
                 elif quantity == "tau" and self._is_input(value):
-                    self.record.left_out.append(f"{one.where}: {called} = {value.text[:60]} (an input, not an answer)")
+                    self.record.left_out.append(
+                        f"{one.where}: {called} = {value.text[:60]} (an input, not an answer)"
+                    )
                 else:
                     yield from self._with_entries(one, quantity, value)
             case Several() | Structure():
@@ -250,7 +274,9 @@ class _ProgramAnswers:
             return len(value.entries) == 1
         return True
 
-    def _with_entries(self, one: _Candidate, quantity: str, value: Scalar | Matrix) -> Iterator[_Candidate]:
+    def _with_entries(
+        self, one: _Candidate, quantity: str, value: Scalar | Matrix
+    ) -> Iterator[_Candidate]:
         """Yield a matrix whole, or the entries of one that was assigned entry by entry."""
         if isinstance(value, Scalar) or not self._is_by_entries(one, value):
             yield replace(one, value=value)
@@ -258,11 +284,18 @@ class _ProgramAnswers:
         for index, entry in value.entries.items():
             inside = self.quantities.index_in(quantity, index)
             if inside is not None:
-                target = Target(quantity, inside) if self.quantities.shape(quantity) else Target(quantity)
+                target = (
+                    Target(quantity, inside)
+                    if self.quantities.shape(quantity)
+                    else Target(quantity)
+                )
                 yield replace(one, target=target, value=entry)
             elif len(value.entries) > 1 or not one.is_alias:
                 place = ", ".join(str(k + 1) for k in index)
-                yield replace(one, value=Unread(f"{one.name} has no entry ({place}), which {one.where} assigns"))
+                yield replace(
+                    one,
+                    value=Unread(f"{one.name} has no entry ({place}), which {one.where} assigns"),
+                )
 
     def _is_by_entries(self, one: _Candidate, value: Matrix) -> bool:
         """Whether a matrix was assigned entry by entry, and may lack some."""
@@ -286,7 +319,9 @@ class _ProgramAnswers:
                 returned.append(self._unread(function, quantity, reason))
                 continue
             try:
-                value, scope = self.program.applied(function, self.program.arguments_as_given(function))
+                value, scope = self.program.applied(
+                    function, self.program.arguments_as_given(function)
+                )
             except UnreadError as error:
                 quantity = self.quantities.quantity(called_name(function))
                 if quantity and not self.quantities.is_parameter(called_name(function)):
@@ -307,7 +342,9 @@ class _ProgramAnswers:
         key = self.program.main.key(function.name)
         return _Candidate(Target(quantity), function.where, Unread(reason), function.name, key)
 
-    def _local_to(self, function: Function, scope: Scope, value: Value, given: set[str]) -> Iterator[_Candidate]:
+    def _local_to(
+        self, function: Function, scope: Scope, value: Value, given: set[str]
+    ) -> Iterator[_Candidate]:
         """Yield the quantities that a function assigns and does not return."""
         quantity = self.quantities.quantity(called_name(function))
         for name in list(scope.names):
@@ -329,7 +366,9 @@ class _ProgramAnswers:
         for one in local:
             if not isinstance(one.value, Unread) and one.target.quantity not in noted:
                 noted.add(one.target.quantity)
-                self.record.note(f"{one.where}: {one.name} is a local name of a function, which does not return it")
+                self.record.note(
+                    f"{one.where}: {one.name} is a local name of a function, which does not return it"
+                )
         return local
 
     def _against_main(self, one: _Candidate) -> _Candidate:
@@ -337,18 +376,32 @@ class _ProgramAnswers:
         main = self.program.main
         for name in (
             one.name,
-            *(other for other in main.names if self.quantities.quantity(other) == one.target.quantity),
+            *(
+                other
+                for other in main.names
+                if self.quantities.quantity(other) == one.target.quantity
+            ),
         ):
             binding = main.names.get(name)
-            if binding is None or isinstance(binding.value, Function) or self.record.robot.is_reserved(name):
+            if (
+                binding is None
+                or isinstance(binding.value, Function)
+                or self.record.robot.is_reserved(name)
+            ):
                 continue
-            if isinstance(binding.value, Matrix | Structure) or (name != one.name and isinstance(binding.value, Given)):
+            if isinstance(binding.value, Matrix | Structure) or (
+                name != one.name and isinstance(binding.value, Given)
+            ):
                 continue
             if isinstance(binding.value, Scalar) and self.quantities.is_scalar(one.target.quantity):
                 continue
-            if isinstance(binding.value, Unread) and self._is_call_at_numbers(binding.value, one.function):
+            if isinstance(binding.value, Unread) and self._is_call_at_numbers(
+                binding.value, one.function
+            ):
                 continue
-            return replace(one, value=Unread(f"{name} is bound in {binding.where} to what is not read"))
+            return replace(
+                one, value=Unread(f"{name} is bound in {binding.where} to what is not read")
+            )
         return one
 
     def _is_call_at_numbers(self, value: Unread, function: str) -> bool:
@@ -359,7 +412,9 @@ class _ProgramAnswers:
             return False
         return bool(others) and all(_is_of_numbers(main.names[name].value) for name in others)
 
-    def _is_changed_on_return(self, function: Function, scope: Scope, value: Value, one: _Candidate) -> bool:
+    def _is_changed_on_return(
+        self, function: Function, scope: Scope, value: Value, one: _Candidate
+    ) -> bool:
         """Whether a function's result contains a local name and no other quantity: -G, G*sign."""
         names = set(self.program.returned_names(function))
         uses = frozenset[str]().union(*(x.uses for x in self._all_scalars(value)))
@@ -375,10 +430,18 @@ class _ProgramAnswers:
         if one.name not in names:
             return False
         robot = self.record.robot
-        others = [name for name in names - {one.name} if name not in function.parameters or robot.is_vector(name)]
+        others = [
+            name
+            for name in names - {one.name}
+            if name not in function.parameters or robot.is_vector(name)
+        ]
         for name in others:
-            quantity = self.quantities.quantity(name) or next((t.quantity for t in self.quantities.entries(name)), "")
-            if (quantity and quantity != one.target.quantity) or (robot.is_vector(name) and not quantity):
+            quantity = self.quantities.quantity(name) or next(
+                (t.quantity for t in self.quantities.entries(name)), ""
+            )
+            if (quantity and quantity != one.target.quantity) or (
+                robot.is_vector(name) and not quantity
+            ):
                 return False
         return True
 
@@ -421,14 +484,21 @@ class _ProgramAnswers:
         find: Callable[[Function], str] | None = getattr(self.program, "returned_name", None)
         return find(function) if find is not None else ""
 
-    def _returned_value(self, function: Function, scope: Scope, result: _Result) -> Iterable[_Candidate]:
+    def _returned_value(
+        self, function: Function, scope: Scope, result: _Result
+    ) -> Iterable[_Candidate]:
         name, called, value = result
         is_local = name in scope.names and name not in function.parameters
         if is_local and scope.stands_for(name, value):
             return [*self._given_by(scope, name, called, function.name)]
         quantity = self.quantities.quantity(called) if called else ""
         one = _Candidate(
-            Target(quantity or "M"), function.where, Unread(""), called, f"{scope.number}:", function=function.name
+            Target(quantity or "M"),
+            function.where,
+            Unread(""),
+            called,
+            f"{scope.number}:",
+            function=function.name,
         )
         if isinstance(value, Given):
             return []
@@ -436,7 +506,9 @@ class _ProgramAnswers:
             return [replace(one, value=value)]
         if quantity:
             return [
-                *self._given_whole(replace(one, is_alias=self.quantities.is_alias(called)), quantity, called, value)
+                *self._given_whole(
+                    replace(one, is_alias=self.quantities.is_alias(called)), quantity, called, value
+                )
             ]
         if called and isinstance(value, Scalar | Unread):
             return [*self._given_entry(one, called, value)]
@@ -471,12 +543,16 @@ class _ProgramAnswers:
 
     def _without_aliases(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
         """Leave aliases out where the quantity goes by its own name too."""
-        own = {one.target.quantity for one in candidates if not one.is_alias and not one.is_named_entry}
+        own = {
+            one.target.quantity for one in candidates if not one.is_alias and not one.is_named_entry
+        }
         kept = []
         for one in candidates:
             quantity = one.target.quantity
             if one.is_alias and quantity in own:
-                self.record.left_out.append(f"{one.where}: {one.name} (read as a name, since {quantity} is given too)")
+                self.record.left_out.append(
+                    f"{one.where}: {one.name} (read as a name, since {quantity} is given too)"
+                )
                 continue
             if one.is_alias and not isinstance(one.value, Unread):
                 self.record.note(f"{one.where}: {one.name} is read as {quantity}")
@@ -485,7 +561,9 @@ class _ProgramAnswers:
 
     # One quantity
 
-    def _answer(self, own: Sequence[_Candidate], candidates: Sequence[_Candidate]) -> str | Entries | Refusal | None:
+    def _answer(
+        self, own: Sequence[_Candidate], candidates: Sequence[_Candidate]
+    ) -> str | Entries | Refusal | None:
         whole = [one for one in own if one.target.index is None]
         entries = [one for one in own if one.target.index is not None]
         for one in whole:
@@ -516,14 +594,18 @@ class _ProgramAnswers:
             raise AnswerError(f"answers are made of more than {BOUNDS.definitions} names")
         return value.text
 
-    def _whole_answer(self, whole: Sequence[_Candidate], entries: Sequence[_Candidate]) -> str | Refusal:
+    def _whole_answer(
+        self, whole: Sequence[_Candidate], entries: Sequence[_Candidate]
+    ) -> str | Refusal:
         quantity = whole[0].target.quantity
         texts = [self._text_of(one) for one in whole]
         if refused := next((text for text in texts if isinstance(text, Refusal)), None):
             return refused
         whole_texts = [self._spelt_out(one) for one in whole]
         if any(text != whole_texts[0] for text in whole_texts):
-            return Refusal(f"{quantity} is assigned twice, in {whole[0].where} and in {whole[-1].where}")
+            return Refusal(
+                f"{quantity} is assigned twice, in {whole[0].where} and in {whole[-1].where}"
+            )
         for one in entries:
             text = self._text_of(one)
             if isinstance(text, Refusal):
@@ -536,7 +618,9 @@ class _ProgramAnswers:
 
     def _spelt_out(self, one: _Candidate) -> list[str]:
         """Return the texts of an answer's entries, each with its definition if it is a single name."""
-        formulas = {definition.name: definition.formula for definition in self.record.definitions.values()}
+        formulas = {
+            definition.name: definition.formula for definition in self.record.definitions.values()
+        }
         texts = []
         for scalar in _scalars(one.value):
             text = scalar.text
@@ -561,9 +645,13 @@ class _ProgramAnswers:
         if not one.is_named_entry or one.target.quantity in ("M", "C", "g", "tau"):
             return False
         energies = (other for other in candidates if other.target.quantity in _ENERGIES)
-        user = next((other.target.quantity for other in energies if self._is_made_with(other, one)), "")
+        user = next(
+            (other.target.quantity for other in energies if self._is_made_with(other, one)), ""
+        )
         if user:
-            self.record.note(f"{one.where}: {one.name} is read as the program's own name, which {user} uses")
+            self.record.note(
+                f"{one.where}: {one.name} is read as the program's own name, which {user} uses"
+            )
         return bool(user)
 
     def _entries_answer(self, entries: Sequence[_Candidate]) -> Entries | Refusal:
@@ -573,7 +661,9 @@ class _ProgramAnswers:
             index = one.target.index or ()
             text = self._text_of(one)
             if texts.setdefault(index, text) != text:
-                return Refusal(f"{one.target} is assigned twice, in {lines[index]} and in {one.where}")
+                return Refusal(
+                    f"{one.target} is assigned twice, in {lines[index]} and in {one.where}"
+                )
             lines.setdefault(index, one.where)
         return Entries(dict(sorted(texts.items())))
 

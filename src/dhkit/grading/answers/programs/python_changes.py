@@ -38,7 +38,9 @@ _UNBOUNDED = word_set(
 )
 """Names and attributes with which a program may change any name of its own."""
 
-_HARMLESS_DUNDER = frozenset(("__name__", "__file__", "__doc__", "__version__", "__all__", "__init__"))
+_HARMLESS_DUNDER = frozenset(
+    ("__name__", "__file__", "__doc__", "__version__", "__all__", "__init__")
+)
 
 _NEW = (frozenset(FUNCTION_NAMES) - {"max", "min"}) | word_set(
     """
@@ -80,7 +82,21 @@ _CHANGING_KEYWORDS = frozenset(("out", "inplace", "overwrite_a", "overwrite_b", 
 """Keywords with which a function may change its arguments; None is the keyword of ``**options``."""
 
 _MOST_ARGUMENTS = dict.fromkeys(FUNCTION_NAMES, 1) | {
-    **dict.fromkeys(("atan2", "arctan2", "hypot", "power", "dot", "matmul", "round", "solve", "transpose", "cond"), 2),
+    **dict.fromkeys(
+        (
+            "atan2",
+            "arctan2",
+            "hypot",
+            "power",
+            "dot",
+            "matmul",
+            "round",
+            "solve",
+            "transpose",
+            "cond",
+        ),
+        2,
+    ),
     **dict.fromkeys(("clip", "sum", "max", "min", "reshape", "where", "trace", "outer", "mean"), 3),
     **dict.fromkeys(("diff", "Rational", "Eq", "pow", "sqrt", "root", "atan", "log"), 5),
 }
@@ -95,14 +111,20 @@ def ascii_name(name: str) -> str:
         plain, _ = to_ascii(name)
     except AnswerError:
         plain = ""
-    return plain if plain.isidentifier() and plain.isascii() else "u" + name.encode("unicode_escape").hex()
+    return (
+        plain
+        if plain.isidentifier() and plain.isascii()
+        else "u" + name.encode("unicode_escape").hex()
+    )
 
 
 def is_unbounded(node: ast.AST) -> bool:
     """Whether a name or an attribute may change any name of the program."""
     match node:
         case ast.Name(name) | ast.Attribute(_, name):
-            is_dunder = name.startswith("__") and name.endswith("__") and name not in _HARMLESS_DUNDER
+            is_dunder = (
+                name.startswith("__") and name.endswith("__") and name not in _HARMLESS_DUNDER
+            )
             return is_dunder or name in _UNBOUNDED
         case ast.alias(name):
             return name.split(".")[0] in _UNBOUNDED or name == "__main__"
@@ -121,7 +143,9 @@ def assigned_names(node: ast.AST) -> Iterator[str]:
     yield from bound_names(node)
     for inner in without_functions(node):
         match inner:
-            case ast.Subscript(_, _, ast.Store() | ast.Del()) | ast.Attribute(_, _, ast.Store() | ast.Del()):
+            case ast.Subscript(_, _, ast.Store() | ast.Del()) | ast.Attribute(
+                _, _, ast.Store() | ast.Del()
+            ):
                 yield from names_in(inner)[:1]
 
 
@@ -135,7 +159,11 @@ def bound_names(node: ast.AST) -> Iterator[str]:
                 yield name
             case ast.alias(name, other):
                 yield other or name.split(".")[0]
-            case ast.ExceptHandler(_, str(name)) | ast.MatchAs(_, str(name)) | ast.MatchStar(str(name)):
+            case (
+                ast.ExceptHandler(_, str(name))
+                | ast.MatchAs(_, str(name))
+                | ast.MatchStar(str(name))
+            ):
                 yield name
             case ast.MatchMapping(rest=str(name)):
                 yield name
@@ -240,7 +268,9 @@ class Changes:
                     outer.update(inner.names)
         effects = self.of(nodes, self.main, local | set(function.parameters))
         for name, value in function.defaults.items():
-            effects.share(name, value.names if isinstance(value, Unread) else function.default_names)
+            effects.share(
+                name, value.names if isinstance(value, Unread) else function.default_names
+            )
         kept = (local - set(function.parameters)) - outer
         return frozenset(effects.reached() - kept) | frozenset(outer)
 
@@ -272,7 +302,9 @@ def _names_of(value: Value) -> Iterator[str]:
     """Yield the names in a function, or in an unread statement."""
     match value:
         case Function():
-            nodes = [value.definition] if isinstance(value.definition, ast.expr) else value.definition
+            nodes = (
+                [value.definition] if isinstance(value.definition, ast.expr) else value.definition
+            )
             for node in nodes:
                 yield from map(ascii_name, names_in(node))
         case Unread(_, inside):
@@ -323,11 +355,15 @@ class _Piece:
     def note(self, node: ast.AST) -> None:
         """Note what one node does."""
         match node:
-            case ast.Subscript(_, _, ast.Store() | ast.Del()) | ast.Attribute(_, _, ast.Store() | ast.Del()):
+            case ast.Subscript(_, _, ast.Store() | ast.Del()) | ast.Attribute(
+                _, _, ast.Store() | ast.Del()
+            ):
                 self.effects.changed |= self._stored_in(node)
             case ast.AugAssign(target, _, value):
                 self.effects.changed |= self.mentioned(target)
-                self._bind(target, self.shared(value) if not _calculates(value) else set(names_in(value)))
+                self._bind(
+                    target, self.shared(value) if not _calculates(value) else set(names_in(value))
+                )
             case ast.Call():
                 if not self._is_quiet(node):
                     self.effects.changed |= self.mentioned(node)
@@ -339,20 +375,28 @@ class _Piece:
                     self._bind(targets[0], set(names))
             case ast.AnnAssign(target, _, ast.expr() as value) | ast.NamedExpr(target, value):
                 self._bind(target, self.shared(value))
-            case ast.For(target, value) | ast.AsyncFor(target, value) | ast.comprehension(target, value):
+            case (
+                ast.For(target, value)
+                | ast.AsyncFor(target, value)
+                | ast.comprehension(target, value)
+            ):
                 self._bind(target, set(names_in(value)))
             case ast.withitem(value, ast.expr() as target):
                 self._bind(target, set(names_in(value)))
             case ast.Match(value):
                 for name in assigned_names(node):
-                    self.effects.share(ascii_name(name), self.changes.mentioned(names_in(value), self.scope))
+                    self.effects.share(
+                        ascii_name(name), self.changes.mentioned(names_in(value), self.scope)
+                    )
             case ast.Try(handlers=handlers):
                 for handler in handlers:
                     if handler.name:
                         self.effects.share(ascii_name(handler.name), self.mentioned(node))
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 self._note_decorators(node)
-                parameters = tuple(ascii_name(x.arg) for x in ast.walk(node.args) if isinstance(x, ast.arg))
+                parameters = tuple(
+                    ascii_name(x.arg) for x in ast.walk(node.args) if isinstance(x, ast.arg)
+                )
                 inner = Function(ascii_name(node.name), parameters, node.body, "")
                 self.effects.changed |= self.changes.of_function(inner) - set(parameters)
             case ast.Lambda(_, body):
@@ -371,7 +415,11 @@ class _Piece:
     def modules(self) -> set[str]:
         """Return the names of modules."""
         main = self.changes.main
-        return {name for name, binding in main.names.items() if isinstance(binding.value, Module | Library)}
+        return {
+            name
+            for name, binding in main.names.items()
+            if isinstance(binding.value, Module | Library)
+        }
 
     def _stored_in(self, target: ast.AST) -> set[str]:
         """Return the names that an assignment to a part changes: M of M[0, 0], all that it names of (M, 0)[0][0, 0]."""
@@ -394,16 +442,25 @@ class _Piece:
             case ast.UnaryOp() | ast.Compare() | ast.Constant() | ast.JoinedStr():
                 return set()
             case ast.BinOp(left, _, right):
-                return set() if _calculates(value) and not self._has_list(left, right) else set(names_in(value))
+                return (
+                    set()
+                    if _calculates(value) and not self._has_list(left, right)
+                    else set(names_in(value))
+                )
             case ast.Name(name):
                 return {name}
             case ast.Attribute(inner) | ast.Subscript(inner) | ast.Starred(inner):
                 return self.shared(inner)
             case ast.Call(function, arguments, keywords):
-                is_new = self._library_name(function) in _NEW and not {k.arg for k in keywords} & _CHANGING_KEYWORDS
+                is_new = (
+                    self._library_name(function) in _NEW
+                    and not {k.arg for k in keywords} & _CHANGING_KEYWORDS
+                )
                 if is_new and not any(k.arg == "copy" for k in keywords):
                     return set()
-                shared = set().union(*map(self.shared, arguments), *(self.shared(k.value) for k in keywords))
+                shared = set().union(
+                    *map(self.shared, arguments), *(self.shared(k.value) for k in keywords)
+                )
                 return shared | set(names_in(function))
             case ast.List(parts) | ast.Tuple(parts):
                 return set().union(*map(self.shared, parts))
@@ -414,7 +471,9 @@ class _Piece:
         for side in sides:
             if isinstance(side, ast.Name):
                 value = value_of(ascii_name(side.id), self.scope)
-                if isinstance(value, Unread | Several) or (isinstance(value, Matrix) and value.is_list):
+                if isinstance(value, Unread | Several) or (
+                    isinstance(value, Matrix) and value.is_list
+                ):
                     return True
         return False
 
@@ -424,7 +483,9 @@ class _Piece:
             case ast.Name(name):
                 if name in self.local:
                     return ""
-                if name in self.changes.imported and isinstance(value_of(ascii_name(name), self.scope), Unread):
+                if name in self.changes.imported and isinstance(
+                    value_of(ascii_name(name), self.scope), Unread
+                ):
                     return self.changes.imported[name]
                 match value_of(ascii_name(name), self.scope):
                     case None:
@@ -471,7 +532,11 @@ class _Piece:
             case ast.Attribute(inner, method):
                 reached = self.mentioned(inner)
                 is_own = bool(reached & self.changes.classes)
-                most = _MOST_ARGUMENTS.get(method, 100) - 1 if method in ("clip", "dot", "round") else 100
+                most = (
+                    _MOST_ARGUMENTS.get(method, 100) - 1
+                    if method in ("clip", "dot", "round")
+                    else 100
+                )
                 return method in _QUIET_METHODS and not is_own and len(call.args) <= most
             case ast.Call(function):
                 return self._library_name(function) == "Function"
@@ -497,6 +562,14 @@ def _calculates(value: ast.expr) -> bool:
     match value:
         case ast.BinOp(left, _, right):
             return _calculates(left) and _calculates(right)
-        case ast.List() | ast.Tuple() | ast.ListComp() | ast.IfExp() | ast.BoolOp() | ast.Dict() | ast.Set():
+        case (
+            ast.List()
+            | ast.Tuple()
+            | ast.ListComp()
+            | ast.IfExp()
+            | ast.BoolOp()
+            | ast.Dict()
+            | ast.Set()
+        ):
             return False
     return True

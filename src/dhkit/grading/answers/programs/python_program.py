@@ -60,7 +60,18 @@ _MODULES = word_set(
     """
 )
 """Modules whose sin is the sine, and whose other functions mean what their names say."""
-_KNOWN_PACKAGES = ("numpy", "scipy", "sympy", "casadi", "matplotlib", "IPython", "mpmath", "math", "time", "pprint")
+_KNOWN_PACKAGES = (
+    "numpy",
+    "scipy",
+    "sympy",
+    "casadi",
+    "matplotlib",
+    "IPython",
+    "mpmath",
+    "math",
+    "time",
+    "pprint",
+)
 """Packages whose functions are told by their names."""
 _NUMPY = ("numpy", "jax.numpy", "autograd.numpy", "numpy.lib.scimath", "pylab", "np")
 """Modules whose matrices multiply entry by entry."""
@@ -73,12 +84,19 @@ _KNOWN_KEYWORDS = word_set(
     "deep ratio trig force inverse rational method measure power_base power_exp mul log syms dtype"
 )
 """Keywords with which a function writes an expression in another way."""
-_MATRICES = word_set("Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix DM SX MX matrix vertcat")
+_MATRICES = word_set(
+    "Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix DM SX MX matrix vertcat"
+)
 _ARRAYS = word_set("array asarray asanyarray")
 _CASADI = word_set("DM SX MX vertcat horzcat")
 """Matrices of casadi, which multiply entry by entry."""
 _SYMBOLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
-_NUMBERS_OF_SYMPY = {"Half": Scalar("1/2", Level.PRODUCT, 0.5), "One": ONE, "Zero": ZERO, "Pi": Scalar("pi")}
+_NUMBERS_OF_SYMPY = {
+    "Half": Scalar("1/2", Level.PRODUCT, 0.5),
+    "One": ONE,
+    "Zero": ZERO,
+    "Pi": Scalar("pi"),
+}
 _SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^", ast.MatMult: "@"}
 _PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -103,7 +121,9 @@ class PythonProgram:
         No Python, more statements than are read, or one that may change any name.
     """
 
-    def __init__(self, text: str, file: str, line_name: Callable[[int], str], record: Record) -> None:
+    def __init__(
+        self, text: str, file: str, line_name: Callable[[int], str], record: Record
+    ) -> None:
         self.text = text.replace("\r\n", "\n").replace("\r", "\n")
         self.lines = self.text.split("\n")
         self.file = file
@@ -120,7 +140,9 @@ class PythonProgram:
             self._refuse_unbounded(self.tree)
             self._block(self.tree.body, self.main)
         except RecursionError:
-            raise AnswerError(f"{file}: nested too deep to be read; write long sums in parts") from None
+            raise AnswerError(
+                f"{file}: nested too deep to be read; write long sums in parts"
+            ) from None
 
     def _parsed(self) -> ast.Module:
         for line_text in self.lines[:2]:
@@ -132,7 +154,9 @@ class PythonProgram:
                 "ascii",
                 "us-ascii",
             ):
-                raise AnswerError(f"{self.file}: {self.line_name(1)}: written in {coding[1][:20]!r}; expected UTF-8")
+                raise AnswerError(
+                    f"{self.file}: {self.line_name(1)}: written in {coding[1][:20]!r}; expected UTF-8"
+                )
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -150,7 +174,11 @@ class PythonProgram:
     def _refuse_unbounded(self, tree: ast.Module) -> None:
         for node in ast.walk(tree):
             if is_unbounded(node):
-                name = getattr(node, "id", "") or getattr(node, "attr", "") or getattr(node, "name", "")
+                name = (
+                    getattr(node, "id", "")
+                    or getattr(node, "attr", "")
+                    or getattr(node, "name", "")
+                )
                 raise AnswerError(
                     f"{self.file}: {self.line_name(getattr(node, 'lineno', 1))}: found {name[:40]!r}, which may change "
                     "any name; a program is read, not run (--execute)"
@@ -199,9 +227,13 @@ class PythonProgram:
             case ast.If(test, body, []) if scope is self.main and _is_main(test):
                 self._block(body, scope)
                 return
-            case ast.Expr(ast.Call(ast.Name("var") | ast.Attribute(_, "var"), [ast.Constant(str(text)), *_])):
+            case ast.Expr(
+                ast.Call(ast.Name("var") | ast.Attribute(_, "var"), [ast.Constant(str(text)), *_])
+            ):
                 for name in _symbol_names(text):
-                    scope.bind(ascii_name(name), Given(name, is_symbol=True, is_constant=True), where)
+                    scope.bind(
+                        ascii_name(name), Given(name, is_symbol=True, is_constant=True), where
+                    )
             case ast.Expr() | ast.Pass() | ast.AnnAssign() | ast.Assert() | ast.Return():
                 pass
             case _:
@@ -211,13 +243,19 @@ class PythonProgram:
         for node in chain.from_iterable(map(ast.walk, pieces)):
             if isinstance(node, ast.NamedExpr):
                 for one in names_in(node.target):
-                    scope.change(ascii_name(one), f"{one[:40]} is changed by := in {where}", only_matrices=False)
+                    scope.change(
+                        ascii_name(one),
+                        f"{one[:40]} is changed by := in {where}",
+                        only_matrices=False,
+                    )
         self._note(self.changes.of(pieces, scope, scope.local), scope, where)
 
     def _note(self, effects: Effects, scope: Scope, where: str) -> None:
         """Note the names whose values a statement may change, and those that may be the same matrix after it."""
         for name, others in effects.shared.items():
-            if scope.is_mutable(name) or not isinstance(value_of(name, scope), Scalar | Function | Module | Library):
+            if scope.is_mutable(name) or not isinstance(
+                value_of(name, scope), Scalar | Function | Module | Library
+            ):
                 scope.add_alias(name, others)
         for name in sorted(effects.changed):
             scope.change(name, f"{name[:40]} may be changed in {where}")
@@ -230,7 +268,9 @@ class PythonProgram:
         kind = {"FunctionDef": "a function", "Delete": "'del'"}
         what = kind.get(type(statement).__name__, repr(type(statement).__name__.lower()))
         for name in dict.fromkeys(map(ascii_name, assigned_names(statement))):
-            after = "after it is assigned, " if isinstance(statement, ast.AugAssign) else f"by {what} "
+            after = (
+                "after it is assigned, " if isinstance(statement, ast.AugAssign) else f"by {what} "
+            )
             scope.change(name, f"{name[:40]} is changed {after}in {where}", only_matrices=False)
         self._note(self.changes.of([statement], scope, scope.local), scope, where)
 
@@ -246,13 +286,23 @@ class PythonProgram:
         for inner in statement.body:
             if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
                 self.record.note_left_out(f"{where}: class {statement.name[:40]}")
-                arguments = {ascii_name(x.arg) for x in ast.walk(inner.args) if isinstance(x, ast.arg)}
+                arguments = {
+                    ascii_name(x.arg) for x in ast.walk(inner.args) if isinstance(x, ast.arg)
+                }
                 inside |= arguments | {ascii_name(x) for x in assigned_names(inner)}
-        scope.bind(name, Unread(f"{statement.name[:40]} is a class, in {where}", frozenset(reached - inside)), where)
+        scope.bind(
+            name,
+            Unread(f"{statement.name[:40]} is a class, in {where}", frozenset(reached - inside)),
+            where,
+        )
         for node in ast.walk(statement):
             if isinstance(node, ast.Global):
                 for one in node.names:
-                    scope.change(ascii_name(one), f"{one[:40]} is changed in a class, in {where}", only_matrices=False)
+                    scope.change(
+                        ascii_name(one),
+                        f"{one[:40]} is changed in a class, in {where}",
+                        only_matrices=False,
+                    )
         self._note(self.changes.of([statement], scope, scope.local), scope, where)
 
     def _fields(self, statement: ast.ClassDef, scope: Scope) -> dict[str, Value] | None:
@@ -260,7 +310,9 @@ class PythonProgram:
         fields: dict[str, Value] = {}
         for inner in statement.body:
             match inner:
-                case ast.AnnAssign(ast.Name(name), _, ast.expr() as value) | ast.Assign([ast.Name(name)], value):
+                case ast.AnnAssign(ast.Name(name), _, ast.expr() as value) | ast.Assign(
+                    [ast.Name(name)], value
+                ):
                     if name in fields or fields.keys() & set(names_in(value)):
                         return None
                     fields[name] = self._right_side(value, scope, self.where(inner))
@@ -294,26 +346,38 @@ class PythonProgram:
                 for name in dict.fromkeys(assigned_names(target)):
                     reason = f"{name[:40]} is changed by an assignment to a part of it in {where}"
                     scope.change(ascii_name(name), reason, only_matrices=False)
-                self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, where)
+                self._note(
+                    self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, where
+                )
 
     def _right_side(self, value: ast.expr, scope: Scope, where: str) -> Value:
         try:
             return self.value(value, scope)
         except UnreadError as error:
-            return Unread(f"{where}: {error}", frozenset(map(ascii_name, names_in(value))), _is_written_out(value))
+            return Unread(
+                f"{where}: {error}",
+                frozenset(map(ascii_name, names_in(value))),
+                _is_written_out(value),
+            )
 
-    def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, where: str) -> None:
+    def _assign_several(
+        self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, where: str
+    ) -> None:
         names = [target.id for target in targets if isinstance(target, ast.Name)]
         if len(names) != len(targets):
             for name in dict.fromkeys(chain.from_iterable(map(assigned_names, targets))):
                 scope.change(
-                    ascii_name(name), f"{name[:40]} is changed by an unpacking in {where}", only_matrices=False
+                    ascii_name(name),
+                    f"{name[:40]} is changed by an unpacking in {where}",
+                    only_matrices=False,
                 )
             return
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == len(names):
             values = [self._right_side(one, scope, where) for one in value.elts]
         else:
-            values = self._taken_apart(self._right_side(value, scope, where), len(names), scope, where)
+            values = self._taken_apart(
+                self._right_side(value, scope, where), len(names), scope, where
+            )
         for name, one in zip(names, values, strict=True):
             scope.bind(ascii_name(name), one, where)
 
@@ -333,7 +397,13 @@ class PythonProgram:
         return [Unread(f"{where}: an unpacking that is not read")] * count
 
     def _assign_entry(
-        self, name: str, indices: Sequence[ast.expr], value: ast.expr, scope: Scope, where: str, is_added: bool = False
+        self,
+        name: str,
+        indices: Sequence[ast.expr],
+        value: ast.expr,
+        scope: Scope,
+        where: str,
+        is_added: bool = False,
     ) -> None:
         name = ascii_name(name)
         owner = scope.owner(name)
@@ -356,7 +426,10 @@ class PythonProgram:
         if isinstance(stored, Matrix):
             self._share_entry(name, value, scope, where)
         for other in list(scope.same_matrices(name)):
-            scope.change(other, f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {where}")
+            scope.change(
+                other,
+                f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {where}",
+            )
         index = tuple(chain.from_iterable(part for part in parts if part is not None))
         scope.bind_entry(name, index, scalar, where, is_added)
 
@@ -375,7 +448,11 @@ class PythonProgram:
         if module in _MODULES or harmless:
             scope.bind(ascii_name(name), Module(module), where)
         else:
-            scope.bind(ascii_name(name), Unread(f"{name[:40]} is the module {module[:40]} since {where}"), where)
+            scope.bind(
+                ascii_name(name),
+                Unread(f"{name[:40]} is the module {module[:40]} since {where}"),
+                where,
+            )
 
     def _import_from(self, module: str, alias: ast.alias, scope: Scope, where: str) -> None:
         name = ascii_name(alias.asname or alias.name)
@@ -407,19 +484,30 @@ class PythonProgram:
             )
         self.star_modules.append(module)
         for name, binding in list(self.main.names.items()):
-            is_exported = name in _EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
+            is_exported = (
+                name in _EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
+            )
             has_value = not isinstance(binding.value, Module | Library | Unread)
             if module == "math":
                 is_exported = name in ("tau", "e", "pi", "inf", "nan") or name in SCALAR
             elif name in ("tau", "KE", "PE", "Tau", "Jac"):
                 is_exported = False
             if is_exported and has_value:
-                self.main.change(name, f"{name} is changed by 'from {module} import *' in {where}", only_matrices=False)
+                self.main.change(
+                    name,
+                    f"{name} is changed by 'from {module} import *' in {where}",
+                    only_matrices=False,
+                )
 
     # Functions
 
     def _define(
-        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, where: str
+        self,
+        name: str,
+        arguments: ast.arguments,
+        body: Sequence[ast.stmt] | ast.expr,
+        scope: Scope,
+        where: str,
     ) -> None:
         function = self._function(name, arguments, body, scope, where)
         if scope is self.main:
@@ -433,7 +521,12 @@ class PythonProgram:
                     scope.change(ascii_name(one), reason, only_matrices=False)
 
     def _function(
-        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, where: str
+        self,
+        name: str,
+        arguments: ast.arguments,
+        body: Sequence[ast.stmt] | ast.expr,
+        scope: Scope,
+        where: str,
     ) -> Function:
         positional = [*arguments.posonlyargs, *arguments.args]
         parameters = [argument.arg for argument in [*positional, *arguments.kwonlyargs]]
@@ -455,7 +548,11 @@ class PythonProgram:
             before_last = chain.from_iterable(map(without_functions, body[:-1]))
             returns = [node for node in before_last if isinstance(node, kinds)]
             if returns or isinstance(body[-1], ast.If | ast.For | ast.While | ast.Try | ast.With):
-                problem = f"{name} has 'return' in a branch or several, in {where}" if _returns_inside(body) else ""
+                problem = (
+                    f"{name} has 'return' in a branch or several, in {where}"
+                    if _returns_inside(body)
+                    else ""
+                )
         default_names: list[str] = []
         for _, default in pairs:
             if default is not None:
@@ -488,7 +585,9 @@ class PythonProgram:
                     continue
                 if not same:
                     shown = default.text if isinstance(default, Scalar) else "something else"
-                    values[name] = Unread(f"an argument has the default {name} = {shown[:40]} in {function.where}")
+                    values[name] = Unread(
+                        f"an argument has the default {name} = {shown[:40]} in {function.where}"
+                    )
             elif isinstance(default, Structure):
                 values[name] = default
         return values
@@ -534,7 +633,9 @@ class PythonProgram:
                 return self._returned(last.value, scope), scope
             except UnreadError as error:
                 names = frozenset(map(ascii_name, names_in(last.value)))
-                return Unread(f"{self.where(last)}: {error}", names, _is_written_out(last.value)), scope
+                return Unread(
+                    f"{self.where(last)}: {error}", names, _is_written_out(last.value)
+                ), scope
         finally:
             self.depth -= 1
 
@@ -549,7 +650,11 @@ class PythonProgram:
         """Return the names in a function's result."""
         body = function.definition
         last = body if isinstance(body, ast.expr) else body[-1]
-        return list(dict.fromkeys(map(ascii_name, names_in(last)))) if isinstance(last, ast.expr | ast.Return) else []
+        return (
+            list(dict.fromkeys(map(ascii_name, names_in(last))))
+            if isinstance(last, ast.expr | ast.Return)
+            else []
+        )
 
     @staticmethod
     def returned_name(function: Function) -> str:
@@ -625,7 +730,11 @@ class PythonProgram:
         if isinstance(value, Matrix):
             return value
         robot = self.record.robot
-        if isinstance(value, Given) and not robot.vocabulary.knows(value.name) and robot.is_vector(value.name):
+        if (
+            isinstance(value, Given)
+            and not robot.vocabulary.knows(value.name)
+            and robot.is_vector(value.name)
+        ):
             return vector_of([scope.scalar(scope.entry(value, (k,))) for k in range(robot.n)])
         return scope.scalar(value)
 
@@ -636,11 +745,21 @@ class PythonProgram:
         if batch and not nodes:
             return Several(())
         values = [self.value(one, scope) for one in nodes]
-        if all(isinstance(value, Matrix) and value.is_flat and value.is_list for value in values) and values:
-            return matrix_of([list(x.entries.values()) for x in values if isinstance(x, Matrix)], is_list=True)
-        if any(isinstance(value, Matrix) and value.is_list and not value.is_flat for value in values):
+        if (
+            all(isinstance(value, Matrix) and value.is_flat and value.is_list for value in values)
+            and values
+        ):
+            return matrix_of(
+                [list(x.entries.values()) for x in values if isinstance(x, Matrix)], is_list=True
+            )
+        if any(
+            isinstance(value, Matrix) and value.is_list and not value.is_flat for value in values
+        ):
             raise UnreadError("lists nested more than twice are not read")
-        if any(isinstance(value, Matrix | Function | Structure | Several | Text | Module) for value in values):
+        if any(
+            isinstance(value, Matrix | Function | Structure | Several | Text | Module)
+            for value in values
+        ):
             return Several(tuple(values), tuple(_local_name(one) for one in nodes))
         if all(isinstance(value, Part) for value in values) and values:
             return Several(tuple(values))
@@ -651,7 +770,12 @@ class PythonProgram:
             case Module(module):
                 if name == "pi":
                     return Scalar("pi")
-                if f"{module}.{name}" in _MODULES or name in ("linalg", "physics", "mechanics", "matrices"):
+                if f"{module}.{name}" in _MODULES or name in (
+                    "linalg",
+                    "physics",
+                    "mechanics",
+                    "matrices",
+                ):
                     return Module(f"{module}.{name}")
                 if module not in _MODULES and module not in USUAL_MODULES:
                     raise UnreadError(f"{module}.{name} is not read")
@@ -673,13 +797,22 @@ class PythonProgram:
             return self._slice(value, self._with_numbers(index, scope), scope)
         if isinstance(value, Several) and len(numbers) == 1 and numbers[0] < len(value.values):
             return value.values[numbers[0]]
-        if isinstance(value, Matrix) and len(numbers) == 1 and not value.is_flat and 1 not in value.shape:
+        if (
+            isinstance(value, Matrix)
+            and len(numbers) == 1
+            and not value.is_flat
+            and 1 not in value.shape
+        ):
             k = numbers[0]
-            if not (value.multiplies_entries or value.is_list):  # sympy and casadi count through the matrix
+            if not (
+                value.multiplies_entries or value.is_list
+            ):  # sympy and casadi count through the matrix
                 return scope.scalar(_entry_counted(value, k))
             if k >= len(value.rows):
                 raise UnreadError(f"{self._quote(index)} is an index that the matrix does not have")
-            return vector_of(value.rows[k], is_list=value.is_list, multiplies_entries=value.multiplies_entries)
+            return vector_of(
+                value.rows[k], is_list=value.is_list, multiplies_entries=value.multiplies_entries
+            )
         return scope.entry(value, numbers)
 
     def _with_numbers(self, index: ast.expr, scope: Scope) -> ast.expr:
@@ -689,20 +822,31 @@ class PythonProgram:
         ends: list[ast.expr | None] = []
         for end in (index.lower, index.upper):
             known = self._value_or_none(end, scope) if isinstance(end, ast.Name) else None
-            is_whole = isinstance(known, Scalar) and known.number is not None and known.text.isdecimal()
-            ends.append(ast.Constant(int(known.text[:6])) if isinstance(known, Scalar) and is_whole else end)
+            is_whole = (
+                isinstance(known, Scalar) and known.number is not None and known.text.isdecimal()
+            )
+            ends.append(
+                ast.Constant(int(known.text[:6])) if isinstance(known, Scalar) and is_whole else end
+            )
         return ast.copy_location(ast.Slice(ends[0], ends[1], index.step), index)
 
     def _slice(self, value: Value, index: ast.expr, scope: Scope) -> Value:
         """Return M[:3, 3] of a matrix, and x[:2] of a vector."""
         match value, index:
-            case Given(name), ast.Slice(low, high, None) if not self.record.robot.vocabulary.knows(name):
+            case Given(name), ast.Slice(low, high, None) if not self.record.robot.vocabulary.knows(
+                name
+            ):
                 ends = [end if end is None else constant_index(end) for end in (low, high)]
                 if (low is not None and ends[0] is None) or (high is not None and ends[1] is None):
                     raise UnreadError(f"{self._quote(index)} as an index is not read")
                 first = 0 if ends[0] is None else ends[0][0]
                 last = first + self.record.robot.n if ends[1] is None else ends[1][0]
-                return Part(name, tuple(range(first, min(last, BOUNDS.index))), is_slice=True, number=value.number)
+                return Part(
+                    name,
+                    tuple(range(first, min(last, BOUNDS.index))),
+                    is_slice=True,
+                    number=value.number,
+                )
             case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
                 m, n = value.shape
                 chosen = value.part(_chosen(rows, m), _chosen(columns, n))
@@ -745,7 +889,9 @@ class PythonProgram:
             case Library(name):
                 return self._used(self._library_call(name, node, scope), node, scope)
             case Given(name) if isinstance(node.func, ast.Name):
-                if [ast.dump(x) for x in node.args] == ["Name(id='t', ctx=Load())"] and name not in SCALAR:
+                if [ast.dump(x) for x in node.args] == [
+                    "Name(id='t', ctx=Load())"
+                ] and name not in SCALAR:
                     return function
                 if scope.owner(name) is None:
                     return self._used(self._library_call(name, node, scope), node, scope)
@@ -762,11 +908,16 @@ class PythonProgram:
         if isinstance(value, Scalar):
             return replace(value, uses=value.uses | {key})
         if isinstance(value, Matrix):
-            return replace(value, entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()})
+            return replace(
+                value,
+                entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()},
+            )
         return value
 
     def _library_call(self, name: str, node: ast.Call, scope: Scope) -> Value:
-        of_numpy = name.startswith("numpy.") or (bool(self.star_modules) and self.star_modules[-1] in _NUMPY)
+        of_numpy = name.startswith("numpy.") or (
+            bool(self.star_modules) and self.star_modules[-1] in _NUMPY
+        )
         name = name.removeprefix("numpy.")
         keywords = {k.arg: k.value for k in node.keywords}
         if name in _SYMBOLS:
@@ -775,10 +926,13 @@ class PythonProgram:
             return self._symbols(name, node)
         if name in ("dict", "SimpleNamespace"):
             where = self.where(node)
-            return Structure({str(k): self._right_side(x, scope, where) for k, x in keywords.items()})
+            return Structure(
+                {str(k): self._right_side(x, scope, where) for k, x in keywords.items()}
+            )
         dtype = keywords.pop("dtype", None)
         if dtype is not None and not (
-            isinstance(dtype, ast.Name | ast.Attribute) and _last(dtype) in ("object", "float", "float64")
+            isinstance(dtype, ast.Name | ast.Attribute)
+            and _last(dtype) in ("object", "float", "float64")
         ):
             raise UnreadError(f"{self._quote(node)} is not read")
         if name in (*_MATRICES, *_ARRAYS):
@@ -802,13 +956,17 @@ class PythonProgram:
     def _matrix(self, name: str, arguments: Sequence[Value], scope: Scope) -> Value:
         of_numpy = name in (*_ARRAYS, *_CASADI)
         match arguments:
-            case [Scalar() as m, Scalar() as n, Matrix() as entries] if m.text.isdecimal() and n.text.isdecimal():
+            case [Scalar() as m, Scalar() as n, Matrix() as entries] if (
+                m.text.isdecimal() and n.text.isdecimal()
+            ):
                 row_count = int(m.text[:6])
                 columns = int(n.text[:6])
                 flat_entries = list(chain.from_iterable(entries.rows))
                 if row_count * columns != len(flat_entries):
                     raise UnreadError("a matrix whose entries do not fit its size is not read")
-                return matrix_of([flat_entries[k * columns : (k + 1) * columns] for k in range(row_count)])
+                return matrix_of(
+                    [flat_entries[k * columns : (k + 1) * columns] for k in range(row_count)]
+                )
             case [Matrix() as entries]:
                 return as_matrix(entries, of_numpy)
             case [Several(values)] if values and all(isinstance(x, Matrix) for x in values):
@@ -817,7 +975,9 @@ class PythonProgram:
                     if isinstance(x, Matrix):
                         rows += [list(x.entries.values())] if x.is_flat else x.rows
                 return matrix_of(rows, multiplies_entries=of_numpy)
-            case [Several(values)] if not of_numpy and values and all(isinstance(x, Given) for x in values):
+            case [Several(values)] if (
+                not of_numpy and values and all(isinstance(x, Given) for x in values)
+            ):
                 return matrix_of([[scope.scalar(x)] for x in values])
             case [Given() as vector] if of_numpy:
                 return vector
@@ -828,7 +988,9 @@ class PythonProgram:
     def _own_call(self, function: Function, node: ast.Call, scope: Scope) -> Value:
         """Return the value of a call of one of the program's functions."""
         if self.changes.of_function(function):
-            raise UnreadError(f"{function.name}(...) is a function that may change other names, and is not read")
+            raise UnreadError(
+                f"{function.name}(...) is a function that may change other names, and is not read"
+            )
         values: dict[str, Value] = dict(function.defaults)
         arguments: list[Value] = []
         for argument in node.args:
@@ -839,7 +1001,9 @@ class PythonProgram:
         for keyword in node.keywords:
             name = ascii_name(str(keyword.arg))
             if name not in function.parameters[len(arguments) :]:
-                raise UnreadError(f"{function.name}(...) is called with {name[:40]}, which it does not take")
+                raise UnreadError(
+                    f"{function.name}(...) is called with {name[:40]}, which it does not take"
+                )
             values[name] = self.value(keyword.value, scope)
         missing = [name for name in function.parameters if name not in values]
         if missing:
@@ -864,7 +1028,9 @@ class PythonProgram:
                 return transposed(value)
             case Library("SX" | "MX" | "DM") | Given("SX" | "MX" | "DM"), "sym":
                 return self._casadi_symbol(node, scope)
-            case Matrix(), "dot" if len(arguments) == 1 and not value.multiplies_entries and 1 in value.shape:
+            case Matrix(), "dot" if (
+                len(arguments) == 1 and not value.multiplies_entries and 1 in value.shape
+            ):
                 other = self._operand(arguments[0], scope)
                 if not isinstance(other, Matrix) or other.entries.keys() != value.entries.keys():
                     raise UnreadError(f"{self._quote(node)} is not read")
@@ -878,7 +1044,9 @@ class PythonProgram:
             case _, "applyfunc" if len(arguments) == 1 and self._is_unchanging(arguments[0], scope):
                 return unchanged(value)
             case Matrix(), "simplify":
-                raise UnreadError("the method simplify() of a matrix changes it and returns nothing")
+                raise UnreadError(
+                    "the method simplify() of a matrix changes it and returns nothing"
+                )
             case _, name if name in _UNCHANGED_METHODS and name != "applyfunc":
                 plain = all(self._is_unchanging(x, scope) for x in arguments)
                 if plain and not {k.arg for k in node.keywords} & _NOT_UNCHANGING:
@@ -890,7 +1058,9 @@ class PythonProgram:
         match node:
             case ast.Name("t"):
                 value_of_t = value_of("t", scope)
-                return value_of_t is None or (isinstance(value_of_t, Given) and value_of_t.name == "t")
+                return value_of_t is None or (
+                    isinstance(value_of_t, Given) and value_of_t.name == "t"
+                )
             case ast.Attribute(ast.Name(), "_t"):
                 return True
         return False
@@ -902,7 +1072,10 @@ class PythonProgram:
     def _is_unchanging(self, node: ast.expr, scope: Scope) -> bool:
         """Whether an argument is a library's function that writes an expression in another way."""
         value = self._value_or_none(node, scope)
-        return isinstance(value, Library | Given) and value.name.removeprefix("numpy.") in _UNCHANGED_METHODS
+        return (
+            isinstance(value, Library | Given)
+            and value.name.removeprefix("numpy.") in _UNCHANGED_METHODS
+        )
 
     # Symbols and time
 
@@ -943,7 +1116,12 @@ class PythonProgram:
         inner = node.func
         assert isinstance(inner, ast.Call)  # noqa: S101
         is_time = [ast.dump(x) for x in node.args] == ["Name(id='t', ctx=Load())"]
-        if is_time and _last(inner.func) == "Function" and inner.args and isinstance(inner.args[0], ast.Constant):
+        if (
+            is_time
+            and _last(inner.func) == "Function"
+            and inner.args
+            and isinstance(inner.args[0], ast.Constant)
+        ):
             names = _symbol_names(str(inner.args[0].value))
             if len(names) == 1:
                 self._used(Scalar("0"), inner, scope)
@@ -968,7 +1146,9 @@ class PythonProgram:
         match arguments[1:]:
             case [time] if self._is_time(time, scope):
                 order = 1
-            case [time, ast.Constant(2)] | [ast.Tuple([time, ast.Constant(2)])] if self._is_time(time, scope):
+            case [time, ast.Constant(2)] | [ast.Tuple([time, ast.Constant(2)])] if self._is_time(
+                time, scope
+            ):
                 order = 2
             case [time, other] if self._is_time(time, scope) and self._is_time(other, scope):
                 order = 2
@@ -991,7 +1171,9 @@ class PythonProgram:
             known = rate_name(base, ("dot", "ddot")[order - 1 if base == plain else min(order, 1)])
             if vocabulary.is_position(base) and vocabulary.is_state(known):
                 return self._used(scope.known(known), node, scope)
-        raise UnreadError(f"{self._quote(node)}: {name} is the program's own name, of which no rate is read")
+        raise UnreadError(
+            f"{self._quote(node)}: {name} is the program's own name, of which no rate is read"
+        )
 
     def _value_or_none(self, node: ast.expr, scope: Scope) -> Value | None:
         try:
@@ -1045,7 +1227,9 @@ def _local_name(node: ast.expr) -> str:
                 return ascii_name(name)
             case ast.Subscript(inner, ast.Tuple([])):
                 node = inner
-            case ast.Call(ast.Name(), [inner], []) | ast.Call(ast.Attribute(ast.Name()), [inner], []):
+            case ast.Call(ast.Name(), [inner], []) | ast.Call(
+                ast.Attribute(ast.Name()), [inner], []
+            ):
                 node = inner
             case ast.Call(ast.Attribute(inner), [], []):
                 node = inner
@@ -1090,7 +1274,11 @@ def _assigned_by(node: ast.AST) -> Iterator[str]:
         case ast.Subscript(_, ast.Constant(str(key)), ast.Store()):
             yield key
         case ast.Dict(keys):
-            yield from (key.value for key in keys if isinstance(key, ast.Constant) and isinstance(key.value, str))
+            yield from (
+                key.value
+                for key in keys
+                if isinstance(key, ast.Constant) and isinstance(key.value, str)
+            )
 
 
 def _ends(statement: ast.stmt) -> bool:
@@ -1118,7 +1306,11 @@ def _executed(statement: ast.stmt) -> list[ast.AST]:
 def _is_plain_class(statement: ast.ClassDef) -> bool:
     """Whether a class is made by nothing else than its body: by no base or decorator but a dataclass's."""
     decorators = [x.func if isinstance(x, ast.Call) else x for x in statement.decorator_list]
-    return not statement.bases and not statement.keywords and all(_last(x) == "dataclass" for x in decorators)
+    return (
+        not statement.bases
+        and not statement.keywords
+        and all(_last(x) == "dataclass" for x in decorators)
+    )
 
 
 def _is_main(test: ast.expr) -> bool:
@@ -1133,7 +1325,9 @@ def _is_batch_shape(node: ast.expr) -> bool:
     """Whether an entry of a tuple is ``*q.shape[:-1]``."""
     match node:
         case ast.Starred(
-            ast.Subscript(ast.Attribute(_, "shape"), ast.Slice(None, ast.UnaryOp(ast.USub(), ast.Constant(1))))
+            ast.Subscript(
+                ast.Attribute(_, "shape"), ast.Slice(None, ast.UnaryOp(ast.USub(), ast.Constant(1)))
+            )
         ):
             return True
     return False

@@ -12,7 +12,8 @@ from dhkit.grading.answers.sheet_values import NO_NAMES, Names
 from dhkit.grading.answers.vocabulary import Meaning, plain_name
 
 _JOINT_VARIABLE = re.compile(
-    r"(?:dd|DD|ddot|dot|d2|d|D)?(?:q|th|theta|Theta|vartheta)(?:dd|d|ddot|dot|pp|p)?\d*\w*", re.ASCII
+    r"(?:dd|DD|ddot|dot|d2|d|D)?(?:q|th|theta|Theta|vartheta)(?:dd|d|ddot|dot|pp|p)?\d*\w*",
+    re.ASCII,
 )
 """Spellings of joint variables that nobody uses for anything else; x2 or t1 may be a student's own name."""
 
@@ -22,7 +23,11 @@ NUMBER_TOLERANCE = 1e-12
 
 def is_same_number(value: float | None, number: float | None) -> bool:
     """Whether a number in a program is a parameter's value, up to :data:`NUMBER_TOLERANCE`; None is not a number."""
-    return value is not None and number is not None and abs(value - number) <= NUMBER_TOLERANCE * abs(value)
+    return (
+        value is not None
+        and number is not None
+        and abs(value - number) <= NUMBER_TOLERANCE * abs(value)
+    )
 
 
 class RobotNames:
@@ -68,7 +73,9 @@ class RobotNames:
     def is_same(self, name: str, other: str) -> bool:
         """Whether two names mean the same."""
         meaning = self.find(other)
-        return plain_name(name) == plain_name(other) or (meaning is not None and self.find(name) == meaning)
+        return plain_name(name) == plain_name(other) or (
+            meaning is not None and self.find(name) == meaning
+        )
 
     def parameter_value(self, name: str) -> float | None:
         """Return the value that the robot's file gives the parameter of this name."""
@@ -96,12 +103,15 @@ class RobotNames:
             case Scalar() if self.quantities.is_parameter(name) and value.number is not None:
                 file_value = self.parameter_value(name)
                 if not is_same_number(file_value, value.number):
-                    raise UnreadError(f"{name} is set to {value.text[:40]}; the robot's file has {file_value}")
+                    raise UnreadError(
+                        f"{name} is set to {value.text[:40]}; the robot's file has {file_value}"
+                    )
                 return True
             case Matrix() if self.is_vector(name):
                 entries = list(chain.from_iterable(value.rows))
                 vector = plain_name(name)
                 return len(entries) == self.n and all(
-                    entry.is_name and self.is_same(f"{vector}{k}", entry.text) for k, entry in enumerate(entries, 1)
+                    entry.is_name and self.is_same(f"{vector}{k}", entry.text)
+                    for k, entry in enumerate(entries, 1)
                 )
         return False

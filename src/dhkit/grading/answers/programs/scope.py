@@ -160,9 +160,15 @@ class Record:
 
     def _is_free(self, name: str, text: str) -> bool:
         plain = plain_name(name)
-        is_special = name in FUNCTION_NAMES or name in _NOT_NAMES or name in MODULES or name in DERIVATIVES
+        is_special = (
+            name in FUNCTION_NAMES or name in _NOT_NAMES or name in MODULES or name in DERIVATIVES
+        )
         vocabulary = self.robot.vocabulary
-        is_known = vocabulary.is_state(plain) or self.robot.is_vector(plain) or self.robot.quantities.is_parameter(name)
+        is_known = (
+            vocabulary.is_state(plain)
+            or self.robot.is_vector(plain)
+            or self.robot.quantities.is_parameter(name)
+        )
         is_name = re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) is not None
         return is_name and not is_special and not is_known and self._texts.get(plain, text) == text
 
@@ -205,7 +211,9 @@ class Scope:
         Names that a function binds; they are not looked up outside.
     """
 
-    def __init__(self, record: Record, outer: Scope | None = None, local: frozenset[str] = frozenset()) -> None:
+    def __init__(
+        self, record: Record, outer: Scope | None = None, local: frozenset[str] = frozenset()
+    ) -> None:
         self.record = record
         self.robot = record.robot
         self.outer = outer
@@ -258,7 +266,9 @@ class Scope:
         if is_reserved and not isinstance(value, Unread | Function):
             if not robot.keeps_meaning(name, value):
                 shown = value.text if isinstance(value, Scalar | Matrix) else "something else"
-                raise UnreadError(f"{name} is set to {shown[:40]!r} in {where}, and is the robot's own name")
+                raise UnreadError(
+                    f"{name} is set to {shown[:40]!r} in {where}, and is the robot's own name"
+                )
             if isinstance(value, Scalar) and value.number is not None:
                 self.record.note(f"{where}: {name} = {value.text} is the file's own number")
             if isinstance(value, Scalar):
@@ -294,7 +304,9 @@ class Scope:
             return
         known = self.record.symbols.setdefault(meaning, SymbolMade(value.name, where))
         if known.name != value.name:
-            raise UnreadError(f"{known.name} ({known.where}) and {value.name} would both be read as {''.join(meaning)}")
+            raise UnreadError(
+                f"{known.name} ({known.where}) and {value.name} would both be read as {''.join(meaning)}"
+            )
 
     def _named_entries(self, name: str, matrix: Matrix, where: str) -> Matrix:
         entries = {}
@@ -311,12 +323,18 @@ class Scope:
             case Scalar(), Scalar():
                 return old.text == new.text or (old.is_name and old.text == new.text)
             case Matrix(), Matrix():
-                return {k: x.text for k, x in old.entries.items()} == {k: x.text for k, x in new.entries.items()}
+                return {k: x.text for k, x in old.entries.items()} == {
+                    k: x.text for k, x in new.entries.items()
+                }
         return old == new
 
     def _vector(self, value: Value) -> Value:
         """Return several symbols under one name as the vector of them."""
-        if isinstance(value, Several) and value.values and all(isinstance(x, Given) for x in value.values):
+        if (
+            isinstance(value, Several)
+            and value.values
+            and all(isinstance(x, Given) for x in value.values)
+        ):
             return vector_of([Scalar(x.name) for x in value.values if isinstance(x, Given)])
         return value
 
@@ -332,7 +350,9 @@ class Scope:
             names = [plain]
         else:
             places = ", ".join(str(place + 1) for place in value.places)
-            raise UnreadError(f"{name} is entry {places} of {value.vector}, of which is not known what it holds")
+            raise UnreadError(
+                f"{name} is entry {places} of {value.vector}, of which is not known what it holds"
+            )
         for place, variable in zip(value.places, names, strict=True):
             taken = self.record.taken
             known = taken.setdefault(StatePlace(value.number, value.vector, place), variable)
@@ -345,14 +365,18 @@ class Scope:
                 raise UnreadError(f"{name} is an entry of {value.vector} that is {known} too")
         return Given(name) if value.is_slice else Scalar(name)
 
-    def bind_entry(self, name: str, index: Index, scalar: Scalar, where: str, is_added: bool = False) -> None:
+    def bind_entry(
+        self, name: str, index: Index, scalar: Scalar, where: str, is_added: bool = False
+    ) -> None:
         """Bind an entry of a matrix: of zeros that were made before, or of one that entries alone make."""
         try:
             self._bind_entry(name, index, scalar, where, is_added)
         except UnreadError as error:
             self.break_name(name, f"{error}, in {where}", where)
 
-    def _bind_entry(self, name: str, index: Index, scalar: Scalar, where: str, is_added: bool) -> None:
+    def _bind_entry(
+        self, name: str, index: Index, scalar: Scalar, where: str, is_added: bool
+    ) -> None:
         binding = self.names.get(name)
         assigned = self.assigned_entries.setdefault(name, set())
         matrix = binding.value if binding is not None else None
@@ -371,15 +395,25 @@ class Scope:
                 raise UnreadError(f"an entry of {name} is set, which is the robot's own vector")
             return
         if self.aliases.get(name):
-            raise UnreadError(f"{name} is changed, and may be the same matrix as {min(self.aliases[name])}")
+            raise UnreadError(
+                f"{name} is changed, and may be the same matrix as {min(self.aliases[name])}"
+            )
         entries = dict(matrix.entries) if isinstance(matrix, Matrix) else {}
-        references = dict(binding.reference.entries) if binding and isinstance(binding.reference, Matrix) else {}
+        references = (
+            dict(binding.reference.entries)
+            if binding and isinstance(binding.reference, Matrix)
+            else {}
+        )
         if isinstance(matrix, Matrix) and matrix.is_zeros:
             index = _fitting(index, matrix)
         if is_added:
             if index not in entries:
                 raise UnreadError(f"an entry of {name} is changed that was not assigned before")
-            scalar = scalar if entries[index].is_zero else joined(references[index], "+", scalar, self.record.power)
+            scalar = (
+                scalar
+                if entries[index].is_zero
+                else joined(references[index], "+", scalar, self.record.power)
+            )
         elif index in assigned and entries[index].text != scalar.text:
             raise UnreadError(f"an entry of {name} is assigned twice")
         if entries and len(next(iter(entries))) != len(index):
@@ -394,16 +428,25 @@ class Scope:
         entries[index] = scalar
         references[index] = replace(named, uses=named.uses | known)
         is_zeros = isinstance(matrix, Matrix) and matrix.is_zeros
-        options = {"is_zeros": is_zeros, "multiplies_entries": bool(getattr(matrix, "multiplies_entries", False))}
+        options = {
+            "is_zeros": is_zeros,
+            "multiplies_entries": bool(getattr(matrix, "multiplies_entries", False)),
+        }
         value = Matrix(dict(sorted(entries.items())), **options)
         reference = Matrix(references, **options)
-        self.names[name] = Binding(value, reference, binding.where if isinstance(matrix, Matrix) and binding else where)
+        self.names[name] = Binding(
+            value, reference, binding.where if isinstance(matrix, Matrix) and binding else where
+        )
 
-    def break_name(self, name: str, reason: str, where: str = "", value: Value | None = None) -> None:
+    def break_name(
+        self, name: str, reason: str, where: str = "", value: Value | None = None
+    ) -> None:
         """Note that a name, and whatever is made of it, is not to be relied on."""
         self.record.broken.setdefault(self.key(name), reason)
         if name not in self.names:
-            self.names[name] = Binding(Unread(reason) if value is None else value, Unread(reason), where)
+            self.names[name] = Binding(
+                Unread(reason) if value is None else value, Unread(reason), where
+            )
 
     def change(self, name: str, reason: str, only_matrices: bool = True) -> None:
         """Note that something changes a name, or the matrix that it stands for, in a way that is not read."""
@@ -431,7 +474,9 @@ class Scope:
     def is_bare_zero(self, name: str) -> bool:
         """Whether a name is bound to a zero of the states' shape, which ``K[...] =`` replaces."""
         binding = self.names.get(name)
-        return binding is not None and isinstance(binding.value, Matrix) and not binding.value.entries
+        return (
+            binding is not None and isinstance(binding.value, Matrix) and not binding.value.entries
+        )
 
     def add_alias(self, name: str, others: Iterable[str]) -> None:
         """Note that a name may be the same list or matrix as others, or share entries with them."""
@@ -515,12 +560,16 @@ class Scope:
         plain = plain_name(name)
         owner = self.owner(name) or self._outermost()
         uses = {owner.key(name)}
-        if not vocabulary.knows(name) and (self.owner(name) is not None or vocabulary.split(plain) is None):
+        if not vocabulary.knows(name) and (
+            self.owner(name) is not None or vocabulary.split(plain) is None
+        ):
             raise UnreadError(f"unknown name {name[:40]!r} ({vocabulary.nearest(name[:60])})")
         if not vocabulary.knows(name):
             inside = next((x for x in self.everything() if len(x) < len(plain) and x in plain), "")
             if inside:
-                raise UnreadError(f"unknown name {name[:40]!r}, which is not a product: {inside} is the program's")
+                raise UnreadError(
+                    f"unknown name {name[:40]!r}, which is not a product: {inside} is the program's"
+                )
         # c1 is the cosine of q1: whoever binds q1 to something else changes c1.
         for word in self.robot.find(name) or ():
             if word[0].isalpha() and word != name:
@@ -543,7 +592,9 @@ class Scope:
         """Return the joint variable that an entry of a state was said to be."""
         entry = StatePlace(number, vector, place)
         if entry not in self.record.taken:
-            raise UnreadError(f"entry {place + 1} of {vector} is read, of which is not known what it holds")
+            raise UnreadError(
+                f"entry {place + 1} of {vector} is read, of which is not known what it holds"
+            )
         return self.known(self.record.taken[entry])
 
     def entry(self, value: Value, index: Index) -> Value:
@@ -554,14 +605,18 @@ class Scope:
             case Given(name, is_argument):
                 place = index[0] if len(index) == 1 or (len(index) == 2 and index[1] == 0) else None
                 if place is None:
-                    raise UnreadError(f"an entry of {name} is read, which is not a vector of the robot's")
+                    raise UnreadError(
+                        f"an entry of {name} is read, which is not a vector of the robot's"
+                    )
                 if self.robot.has_entry(name, place):
                     key = (self.owner(name) or self._outermost()).key(name)
                     scalar = self.known(f"{plain_name(name)}{place + 1}")
                     return replace(scalar, uses=scalar.uses | value.uses | {key})
                 if is_argument or not self.robot.vocabulary.knows(name):
                     return Part(name, (place,), number=value.number)
-                raise UnreadError(f"an entry of {name} is read, which is not a vector of the robot's")
+                raise UnreadError(
+                    f"an entry of {name} is read, which is not a vector of the robot's"
+                )
         raise UnreadError("an entry of what is not a matrix is not read")
 
     def field(self, value: Value, name: str) -> Value:
@@ -573,7 +628,9 @@ class Scope:
                 if parameter is None or not self.robot.quantities.is_parameter(name):
                     return found
                 if not self.robot.keeps_meaning(name, found):
-                    raise UnreadError(f"the field {name} is set to something else than the parameter")
+                    raise UnreadError(
+                        f"the field {name} is set to something else than the parameter"
+                    )
                 return Scalar(plain_name(parameter))
             case Given(structure, True):
                 if parameter is None:
@@ -587,7 +644,9 @@ class Scope:
 
 def _can_change(value: Value) -> bool:
     """Whether something else than an assignment can change a value: numbers, expressions and symbols cannot change."""
-    return isinstance(value, Matrix | Structure) or (isinstance(value, Given) and not value.is_symbol)
+    return isinstance(value, Matrix | Structure) or (
+        isinstance(value, Given) and not value.is_symbol
+    )
 
 
 def _with_line(message: str, where: str) -> str:

@@ -62,7 +62,10 @@ class Scalar:
     @property
     def is_name(self) -> bool:
         """Whether it is a single name."""
-        return self.level is Level.ATOM and re.fullmatch(r"[A-Za-z]\w*", self.text, re.ASCII) is not None
+        return (
+            self.level is Level.ATOM
+            and re.fullmatch(r"[A-Za-z]\w*", self.text, re.ASCII) is not None
+        )
 
     @property
     def is_zero(self) -> bool:
@@ -134,7 +137,9 @@ class Matrix:
 
     def mapped(self, change: Callable[[Scalar], Scalar]) -> Matrix:
         """Return the matrix with a function applied to each entry."""
-        return replace(self, entries={k: change(x) for k, x in self.entries.items()}, is_zeros=False)
+        return replace(
+            self, entries={k: change(x) for k, x in self.entries.items()}, is_zeros=False
+        )
 
 
 @dataclass(frozen=True)
@@ -279,7 +284,19 @@ class Text:
     text: str
 
 
-Value: TypeAlias = Scalar | Matrix | Given | Part | Structure | Library | Module | Function | Several | Unread | Text
+Value: TypeAlias = (
+    Scalar
+    | Matrix
+    | Given
+    | Part
+    | Structure
+    | Library
+    | Module
+    | Function
+    | Several
+    | Unread
+    | Text
+)
 
 
 # Scalars
@@ -304,7 +321,9 @@ def joined(left: Scalar, sign: str, right: Scalar, power: str = "^") -> Scalar:
             level = Level.POWER
             text = f"{left.at_least(Level.ATOM)}{power}{right.at_least(Level.ATOM)}"
     if len(text) > BOUNDS.entry_characters:
-        raise UnreadError(f"a formula of {len(text)} characters; expected at most {BOUNDS.entry_characters}")
+        raise UnreadError(
+            f"a formula of {len(text)} characters; expected at most {BOUNDS.entry_characters}"
+        )
     return Scalar(text, level, _calculated(left.number, sign, right.number), left.uses | right.uses)
 
 
@@ -393,7 +412,11 @@ def transposed(matrix: Matrix) -> Matrix:
     """Return a transpose; that of a flat vector is the vector."""
     if matrix.is_flat:
         return matrix
-    return replace(matrix, entries=dict(sorted(((j, i), x) for (i, j), x in matrix.entries.items())), is_zeros=False)
+    return replace(
+        matrix,
+        entries=dict(sorted(((j, i), x) for (i, j), x in matrix.entries.items())),
+        is_zeros=False,
+    )
 
 
 def entry_of(matrix: Matrix, index: Index) -> Scalar:
@@ -414,7 +437,9 @@ def product(left: Matrix, right: Matrix, power: str = "^") -> Matrix | Scalar:
     if left.is_flat:
         a = [[row[0] for row in a]]  # numpy: a flat vector in front is a row
     if len(a[0]) != len(b):
-        raise UnreadError(f"a product of matrices of {len(a)} x {len(a[0])} and {len(b)} x {len(b[0])}")
+        raise UnreadError(
+            f"a product of matrices of {len(a)} x {len(a[0])} and {len(b)} x {len(b[0])}"
+        )
     if len(a) * len(b) * len(b[0]) > BOUNDS.matrix_entries:
         raise UnreadError("a product of matrices of this size is not read")
     columns = list(zip(*b, strict=True))
@@ -466,7 +491,9 @@ def calculated(left: Value, sign: str, right: Value, power: str = "^") -> Value:
             return left.mapped(lambda x: joined(x, "^", right, power))
         if plain == "^" and not left.multiplies_entries:
             return _power_of_matrix(left, right, power)
-    is_of_entries = plain == "*" or (plain in ("+", "-") and getattr(right, "multiplies_entries", False))
+    is_of_entries = plain == "*" or (
+        plain in ("+", "-") and getattr(right, "multiplies_entries", False)
+    )
     if isinstance(left, Scalar) and isinstance(right, Matrix) and is_of_entries:
         return right.mapped(lambda x: joined(left, plain, x, power))
     raise UnreadError(f"{sign!r} between these matrices or numbers is not read")
@@ -479,7 +506,9 @@ def _of_two_matrices(left: Matrix, sign: str, right: Matrix, power: str) -> Valu
     if sign == "@" or (sign == "*" and not multiplies_entries):
         return product(left, right, power)
     plain = sign.removeprefix(".")
-    is_by_entries = sign.startswith(".") or plain in ("+", "-") or (multiplies_entries and plain in ("*", "/"))
+    is_by_entries = (
+        sign.startswith(".") or plain in ("+", "-") or (multiplies_entries and plain in ("*", "/"))
+    )
     if not is_by_entries or left.entries.keys() != right.entries.keys():
         raise UnreadError(f"{sign!r} between matrices of these sizes is not read")
     entries = {k: joined(x, plain, right.entries[k], power) for k, x in left.entries.items()}

@@ -26,6 +26,7 @@ export class StatusCard {
         id: "card",
         open: remembered("card", innerWidth > WIDE ? "open" : "") === "open",
         "aria-label": "State of the arm",
+        "data-room": WIDE,
       },
       h("summary", {}, this.title, this.alarm),
       h("table", {}, h("caption", {}, "Joints"), this.joints),

@@ -1,11 +1,11 @@
 // Plots below the scene, as wide as it is: of a motion or of a simulation, up to three in a row.
 
 import { h } from "./dom.js";
+import { draggedEdge } from "./edge.js";
 import { remember, remembered } from "./memory.js";
 
 const USUAL = 236,
   LEAST = 150; // px
-const STEP = 24; // px that an arrow key moves the edge
 const SCENE = 200; // px that are left to the scene
 
 export class PlotDock {
@@ -34,8 +34,12 @@ export class PlotDock {
       h("header", {}, this.choice, this.legend, this.fold),
       this.row,
     );
-    this.grip.addEventListener("pointerdown", (event) => this.drag(event));
-    this.grip.addEventListener("keydown", (event) => this.key(event));
+    draggedEdge(this.grip, {
+      keys: ["ArrowDown", "ArrowUp"],
+      sizeAt: ({ clientY }) => innerHeight - clientY,
+      size: () => this.height,
+      take: (height) => this.resize(height),
+    });
     this.layout();
   }
 
@@ -107,25 +111,6 @@ export class PlotDock {
     this.height = Math.max(LEAST, Math.min(height, innerHeight - SCENE));
     remember("dock-height", String(Math.round(this.height)));
     this.layout();
-  }
-
-  drag(event) {
-    this.grip.setPointerCapture(event.pointerId);
-    const move = ({ clientY }) => this.resize(innerHeight - clientY);
-    this.grip.addEventListener("pointermove", move);
-    this.grip.addEventListener(
-      "lostpointercapture",
-      () => this.grip.removeEventListener("pointermove", move),
-      { once: true },
-    );
-  }
-
-  key(event) {
-    const step = { ArrowUp: STEP, ArrowDown: -STEP }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    event.stopPropagation();
-    this.resize(this.height + step);
   }
 
   unitsChanged() {

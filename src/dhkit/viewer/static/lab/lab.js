@@ -3,6 +3,7 @@
 import { StatusCard } from "./card.js";
 import { PlotDock } from "./dock.js";
 import { depthText, h } from "./dom.js";
+import { draggedEdge } from "./edge.js";
 import { icon } from "./icons.js";
 import { remember, remembered } from "./memory.js";
 
@@ -12,7 +13,6 @@ const WIDTH = 348,
   NARROW = 280,
   SCENE = 420; // px: of a panel at first, on a small page, at least, and left to the scene
 const LENGTHS = { m: "m", cm: "mm", mm: "mm", in: "in" }; // units of files, as the page shows them
-const STEP = 24; // px that an arrow key moves the edge
 
 export class Lab {
   // groups: of panels, [name, title, class] each; requests(failed): what answers them.
@@ -112,8 +112,12 @@ export class Lab {
     document.body.prepend(
       h("aside", { id: "lab", "aria-label": "Lab" }, rail, this.body, this.edge),
     );
-    this.edge.addEventListener("pointerdown", (event) => this.dragEdge(event));
-    this.edge.addEventListener("keydown", (event) => this.moveEdge(event));
+    draggedEdge(this.edge, {
+      keys: ["ArrowLeft", "ArrowRight"],
+      sizeAt: ({ clientX }) => clientX - this.body.getBoundingClientRect().left,
+      size: () => this.width,
+      take: (width) => this.setWidth(width),
+    });
     this.width = Number(remembered("width", String(innerWidth < 1000 ? SLIM : WIDTH)));
     this.folded = false;
     this.layout();
@@ -160,26 +164,6 @@ export class Lab {
     this.width = width;
     remember("width", String(Math.round(width)));
     this.layout();
-  }
-
-  dragEdge(event) {
-    this.edge.setPointerCapture(event.pointerId);
-    const begin = this.body.getBoundingClientRect().left,
-      move = ({ clientX }) => this.setWidth(clientX - begin);
-    this.edge.addEventListener("pointermove", move);
-    this.edge.addEventListener(
-      "lostpointercapture",
-      () => this.edge.removeEventListener("pointermove", move),
-      { once: true },
-    );
-  }
-
-  moveEdge(event) {
-    const step = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    event.stopPropagation();
-    this.setWidth(this.width + step);
   }
 
   open(k) {
