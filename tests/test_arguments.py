@@ -186,9 +186,8 @@ POSITIONS = {
 @pytest.mark.parametrize("name", POSITIONS)
 def test_joint_values_may_be_a_configurations_name(name):
     arm = Arm.load("puma560")
-    POSITIONS[name](
-        arm, "nominal"
-    )  # from here on kernels are compiled, or not, in all calls: both differ by rounding
+    # From here on kernels are compiled, or not, in all calls: both differ by rounding.
+    POSITIONS[name](arm, "nominal")
     named = POSITIONS[name](arm, "nominal")
     assert np.array_equal(
         named, POSITIONS[name](arm, arm.configurations["nominal"]), equal_nan=True
@@ -289,10 +288,11 @@ def test_a_rubric_decides_how_many_digits_count():
     loose, strict = (
         arm.grade(M22="0.333*m2*l2^2", rubric=Rubric(digits=digits)) for digits in (3, 5)
     )
+    # Right, as far as it goes.
     assert (loose.verdict.value, strict.verdict.value) == (
         "incomplete",
         "wrong",
-    )  # right, as far as it goes
+    )
 
 
 def test_what_an_arm_returns_is_exported():

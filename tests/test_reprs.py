@@ -702,9 +702,8 @@ def test_solutions_of_arms_that_slide_show_metres():
 
 def test_branches_that_do_not_reach_have_no_numbers():
     arm = dhkit.Arm.load("irb140")
-    found = arm.ik(
-        arm.fk([0, 1.5, -1.4, 0, 0.5, 0])
-    )  # far in front: beyond reach for an arm that leans back over
+    # Far in front: beyond reach for an arm that leans back over.
+    found = arm.ik(arm.fk([0, 1.5, -1.4, 0, 0.5, 0]))
     assert 0 < found.valid.sum() < len(found)
     rows = [
         row

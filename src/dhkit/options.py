@@ -58,6 +58,5 @@ class Options:
 
 
 def _is_same(value: object, default: object) -> bool:
-    return value is default or (
-        type(value) is type(default) and bool(value == default)
-    )  # arrays are not defaults
+    # Arrays are not defaults.
+    return value is default or (type(value) is type(default) and bool(value == default))

@@ -114,9 +114,8 @@ def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(
-            signal.SIGHUP, signal.SIG_DFL
-        ),  # tests under nohup ignore it
+        # Tests under nohup ignore it.
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),
     )
     try:
         wait_for(sleeping, "the call of the program")

@@ -289,9 +289,8 @@ def test_obstacles_are_kept_away_from_and_are_on_the_page(plan, tmp_path, monkey
     start, goal = np.array([0.9, 0.3, 0.3]), np.array([-0.9, -0.3, -0.3])
     direct = arm.plan(start, goal, intervals=16, compare=False)
     times = np.linspace(0, 1, 301)
-    assert (
-        arm.distance(direct.q(direct.duration * times), [ball]).distance.min() < 0
-    )  # it is in the way
+    # It is in the way.
+    assert arm.distance(direct.q(direct.duration * times), [ball]).distance.min() < 0
     drawn = watched(monkeypatch, Slot.OBSTACLES)
     files = str(tmp_path / "run.npz"), str(tmp_path / "run.html")
     ends = ("--from", *words(start), "--to", *words(goal))
@@ -433,6 +432,5 @@ def test_links_keep_away_from_each_other_and_from_the_floor(facts):
     status, kept = facts(*where, "--self-collision", "--floor", "-0.5")
     assert (status, kept["certified"]) == (0, True)
     assert "clearance" in [limit["what"] for limit in kept["limits"]]
-    assert kept["duration_s"] == pytest.approx(
-        free["duration_s"], rel=0.01
-    )  # nothing is in the way
+    # Nothing is in the way.
+    assert kept["duration_s"] == pytest.approx(free["duration_s"], rel=0.01)

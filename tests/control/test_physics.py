@@ -243,9 +243,8 @@ def test_a_stop_leaves_the_share_of_the_rate_that_it_should(restitution, law):
     law.holds("penetration, rad", beyond, 1e-9)
     impact = int(np.argmax(run.qd[:, 2] <= 0))
     before, after = run.qd[impact - 1, 2], run.qd[impact, 2]
-    law.holds(
-        "share of the rate", abs(after / before + restitution), 2e-3
-    )  # a step of gravity lies between
+    # A step of gravity lies between.
+    law.holds("share of the rate", abs(after / before + restitution), 2e-3)
     law.holds("energy without account", run.audit.error, AUDIT)
     if restitution == 0:
         assert run.audit.impacts > 0

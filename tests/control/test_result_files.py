@@ -43,9 +43,8 @@ def test_files_hold_every_bit(name, suffix, tmp_path):
     assert again.description is library_robot(name)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
     for ours, theirs in zip(again.tool_norms, result.tool_norms, strict=True):
-        assert ours == pytest.approx(
-            theirs, abs=1e-14
-        )  # interpreted and compiled kernels round differently
+        # Interpreted and compiled kernels round differently.
+        assert ours == pytest.approx(theirs, abs=1e-14)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

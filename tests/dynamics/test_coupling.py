@@ -34,9 +34,8 @@ def test_the_equations_are_those_of_the_published_subroutine(law):
     a, b = q[:, 1], q[:, 1] + q[:, 2]  # from the vertical
     s, c = np.sin, np.cos
     M = np.zeros((len(q), 3, 3))
-    reach = 0.25 * 60.3 * s(a) ** 2 + 2 * 0.5 * 12.1806 * s(a) * s(
-        b
-    )  # of joint 3's lever, about the vertical axis
+    # Of joint 3's lever, about the vertical axis.
+    reach = 0.25 * 60.3 * s(a) ** 2 + 2 * 0.5 * 12.1806 * s(a) * s(b)
     links = (
         6.7759085 * s(a) ** 2 + 2.311496 * c(a) ** 2 + 8.1077564 * s(b) ** 2 + 0.4372752 * c(b) ** 2
     )
@@ -149,9 +148,8 @@ def test_motions_and_controllers_know_it():
     arm = Arm(MANUTEC)
     ends = [arm.description.numbers.configurations[name] for name in ("start", "goal")]
     motion = arm.plan(*ends)
-    assert motion.duration == pytest.approx(
-        0.4952, abs=2e-4
-    )  # von Stryk & Schlemmer 1994: 0.49519 s
+    # Von Stryk & Schlemmer 1994: 0.49519 s.
+    assert motion.duration == pytest.approx(0.4952, abs=2e-4)
     tau = arm.inverse_dynamics(
         *(getattr(motion, x)(motion.duration / 3) for x in ("q", "qd", "qdd"))
     )

@@ -351,9 +351,8 @@ def test_files_alike_in_name_are_by_their_folders(tmp_path):
         file.parent.mkdir()
         file.touch()
     assert [sheet.student for sheet in find_sheets(files)] == ["ada", "bob"]
-    assert [sheet.student for sheet in find_sheets(files[:1])] == [
-        ""
-    ]  # what it says itself counts then
+    # What it says itself counts then.
+    assert [sheet.student for sheet in find_sheets(files[:1])] == [""]
 
 
 def test_links_out_of_the_folder_are_not_followed(tmp_path):

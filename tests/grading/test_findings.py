@@ -258,9 +258,8 @@ def test_a_printed_zero():
     ],
 )
 def test_what_vanishes_near_zero_alone_is_found(text):
-    assert (
-        ARM.grade(V=text, explain=False, seed=50).verdict is Verdict.WRONG
-    )  # ten sets of parameters missed one here
+    # Ten sets of parameters missed one here.
+    assert ARM.grade(V=text, explain=False, seed=50).verdict is Verdict.WRONG
     for _ in SEEDS:
         assert verdict(V=text) is Verdict.WRONG
 

@@ -353,9 +353,8 @@ def test_a_signal_handler_that_calls_the_same_kernel_changes_nothing(count, mode
     before = signal.signal(signal.SIGALRM, handler)
     try:
         while len(calls) < 300:
-            if (
-                signal.getitimer(signal.ITIMER_REAL)[0] == 0
-            ):  # no period: a handler may last longer, and then nests
+            # No period: a handler may last longer, and then nests.
+            if signal.getitimer(signal.ITIMER_REAL)[0] == 0:
                 signal.setitimer(signal.ITIMER_REAL, 2e-4)
             assert np.array_equal(arm.fk(q), expected)
     finally:

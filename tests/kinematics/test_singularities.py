@@ -68,9 +68,8 @@ def test_pinocchio_has_that_determinant(name):
 def test_any_arm_of_the_families(law, arm):
     law.samples(1000)
     family = classify(arm).family
-    assume(
-        family is not None and family.name not in ("pan_tilt", "slider")
-    )  # links that cancel have none
+    # Links that cancel have none.
+    assume(family is not None and family.name not in ("pan_tilt", "slider"))
     q = states(arm, 20)
     J = controlled(arm, q)
     error = np.abs(np.abs(np.linalg.det(J)) - determinant(arm, q)) / size(arm, J)

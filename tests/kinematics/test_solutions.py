@@ -63,9 +63,8 @@ def test_left_is_the_branch_whose_arm_passes_axis_1_on_the_left(name):
         q = solutions.q[solutions.valid[:, i], i]
         z, p, origins = axes_of(arm, q)
         wrist = origins[:, 5] if name in FAMILY_B else origins[:, 4]
-        across = (
-            np.sum((wrist - p[:, 0]) * z[:, 1], axis=1, keepdims=True) * z[:, 1]
-        )  # axis 1 to the arm's plane
+        # Axis 1 to the arm's plane.
+        across = np.sum((wrist - p[:, 0]) * z[:, 1], axis=1, keepdims=True) * z[:, 1]
         sight = (wrist - p[:, 0])[:, :2]
         side = sight[:, 0] * across[:, 1] - sight[:, 1] * across[:, 0]
         assert ((side > -1e-9) if label.startswith("left") else (side < 1e-9)).all()
@@ -162,9 +161,8 @@ def test_distance_shrinks_to_zero_at_the_boundary():
 
 def test_on_the_boundary_both_elbows_are_one_and_clamped():
     arm = library_robot("puma560")
-    q = np.array(
-        [0.3, 0.4, np.arctan2(-0.4318, 0.0203), 0.5, 0.6, 0.7]
-    )  # axis 3 to wrist in line with the upper arm
+    # Axis 3 to wrist in line with the upper arm.
+    q = np.array([0.3, 0.4, np.arctan2(-0.4318, 0.0203), 0.5, 0.6, 0.7])
     found = 0
     for shift in np.linspace(-2e-8, 2e-8, 201):
         T = forward_kinematics(arm, q + shift * np.eye(6)[2])

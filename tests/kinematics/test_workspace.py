@@ -51,9 +51,8 @@ def test_the_area_of_a_planar_arm_is_a_ring(lengths, tilted):
     ring = np.pi * ((l1 + l2) ** 2 - (l1 - l2) ** 2)
     assert space.estimate.dimension == 2
     assert abs(space.estimate.value - ring) < space.estimate.margin
-    assert space.estimate.value == pytest.approx(
-        ring, rel=0.02
-    )  # 20 samples a cell leave few holes
+    # 20 samples a cell leave few holes.
+    assert space.estimate.value == pytest.approx(ring, rel=0.02)
     assert "m²" in str(space.estimate)
     base = arm.numbers.T_world_base[:3, 3]
     assert np.allclose(

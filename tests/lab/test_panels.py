@@ -109,9 +109,8 @@ def test_the_distance_of_a_planar_arm_is_that_of_two_circles():
 def test_a_stretched_puma_is_at_its_outer_boundary_and_no_state_is_beyond():
     arm = Arm.load("puma560")
     n = arm.description.numbers
-    straight = -np.pi / 2 + np.arctan2(
-        n.a[2], n.d[3]
-    )  # the wrist's centre in line with the upper arm
+    # The wrist's centre in line with the upper arm.
+    straight = -np.pi / 2 + np.arctan2(n.a[2], n.d[3])
     distance, boundary, point = boundary_distance(arm, [0.4, 0.3, straight, 0, 0, 0])
     assert point == "wrist centre"
     assert (distance < CHORD) or boundary != "outer"

@@ -119,9 +119,8 @@ def test_any_table_agrees_with_pinocchio_and_yourdfpy(tmp_path, law, arm):
                 pin.getFrameJacobianTimeVariation(model, data, tool, axes), (6, arm.n)
             )
             difference = np.abs(jacobian_dot(arm, state, rate, frame) - theirs)
-            error = max(difference[:3].max() / scale, difference[3:].max()) / (
-                np.pi * arm.n
-            )  # speeds add up to that
+            # Speeds add up to that.
+            error = max(difference[:3].max() / scale, difference[3:].max()) / (np.pi * arm.n)
             law.holds("Jacobian's rate against Pinocchio", error, JACOBIANS, arm)
 
 

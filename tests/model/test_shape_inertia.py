@@ -47,9 +47,8 @@ def test_balls_and_cylinders_are_right_to_their_meshes():
     n, r, h = 96, 0.7, 1.3
     found = shape_inertia(prism(n, r, h), density=2.0)
     area = n / 2 * r**2 * np.sin(2 * np.pi / n)
-    about_axis = (
-        found.mass * r**2 / 6 * (2 + np.cos(2 * np.pi / n))
-    )  # of a regular polygon with n corners
+    # Of a regular polygon with n corners.
+    about_axis = found.mass * r**2 / 6 * (2 + np.cos(2 * np.pi / n))
     assert found.mass == pytest.approx(2 * area * h, rel=EXACT * 10)
     assert found.inertia[2, 2] == pytest.approx(about_axis, rel=1e-13)
     assert found.inertia[0, 0] == pytest.approx(about_axis / 2 + found.mass * h**2 / 12, rel=1e-13)

@@ -58,9 +58,8 @@ def test_minimum_effort(law):
     motion = Planner(slide(), "effort").solve([0], [0.7], duration=1.3)
     law.holds("effort: 12 d^2 / T^3", relative(motion.report.cost, 12 * 0.7**2 / 1.3**3), 1e-6)
     t = np.linspace(0, motion.duration, 50)
-    assert np.allclose(
-        motion.qdd(t)[:, 0], 6 * 0.7 / 1.3**2 * (1 - 2 * t / 1.3), atol=1e-4
-    )  # a cost is flat at its least
+    # A cost is flat at its least.
+    assert np.allclose(motion.qdd(t)[:, 0], 6 * 0.7 / 1.3**2 * (1 - 2 * t / 1.3), atol=1e-4)
 
 
 def test_minimum_jerk(law):

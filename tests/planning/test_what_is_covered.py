@@ -331,9 +331,8 @@ def test_a_locked_arm_keeps_its_distance_from_the_floor():
 def test_torque_limits_of_an_arm_without_bodies_are_refused():
     arm = dhkit.Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)])
     free = dhkit.Limits.of(arm, lower=-4, upper=4)
-    motion = arm.quintic(
-        [0, 0], [1, 1], duration=2, limits=free
-    )  # a duration is given: nothing has to limit it
+    # A duration is given: nothing has to limit it.
+    motion = arm.quintic([0, 0], [1, 1], duration=2, limits=free)
     with pytest.raises(DescriptionError, match="no body, so the dynamics are unknown"):
         arm.certify(motion, dhkit.Limits.of(arm, torque=5))
     with pytest.raises(

@@ -151,9 +151,8 @@ def test_harm_is_said_and_other_programs_run(name, program, neighbour):
 @pytest.mark.parametrize("name", LEFT_BEHIND)
 def test_what_it_starts_ends_with_it(name, program):
     one = program(LEFT_BEHIND[name])
-    with suppress(
-        ProgramError
-    ):  # who kills the first process of his root ends himself, perhaps before he has answered
+    # Who kills the first process of his root ends himself, perhaps before he has answered.
+    with suppress(ProgramError):
         assert one.call("fk", q=[1.0]) == 1.0
 
 
@@ -179,9 +178,8 @@ def test_many_lines_are_read_and_their_end_is_kept(program):
     text = f"def fk(q):\n    for k in range({last}):\n        print(k)\n    return 1.0\n"
     one = program(text, limits=Limits(60.0))
     assert one.call("fk", q=[1.0]) == 1.0
-    wait_for(
-        lambda: one.output.endswith(f"{last - 1}\n"), "the end of the output"
-    )  # it has a pipe of its own
+    # It has a pipe of its own.
+    wait_for(lambda: one.output.endswith(f"{last - 1}\n"), "the end of the output")
     assert len(one.output) < 100_000
 
 
@@ -446,9 +444,8 @@ def fk(q):
 @pytest.mark.slow
 def test_all_calls_together_are_limited_by_processor_time(program, monkeypatch):
     monkeypatch.setattr("dhkit.programs.caller.BOUNDS", replace(BOUNDS, time=0.5))
-    monkeypatch.setattr(
-        "dhkit.programs.caller.WAITING_FACTOR", HANGS
-    )  # of the clock, on a busy machine
+    # Of the clock, on a busy machine.
+    monkeypatch.setattr("dhkit.programs.caller.WAITING_FACTOR", HANGS)
     busy = program(BUSY)
     caller = Caller(busy, "fk")
     with pytest.raises(ProgramError, match="not called any more"):

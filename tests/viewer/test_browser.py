@@ -418,10 +418,11 @@ def test_ghosts_are_copies_that_come_and_go_with_the_arm_left_alone(live, signal
     picture = page.screenshot()
     assert shows_the_arm(picture)
     check_tool(page, picture, signal_arm, MAX_PANEL_MESSAGES[0])
+    # A bluish ball where each ghost's tool is.
     for q in (
         MAX_PANEL_MESSAGES[1],
         MAX_PANEL_MESSAGES[2],
-    ):  # a bluish ball where each ghost's tool is
+    ):
         x, y = projected(page, world_to_tool(signal_arm, q)[:3, 3]).astype(int)
         r, g, b = picture[y, x]
         assert b > r + 25

@@ -35,9 +35,8 @@ def test_every_robot_has_a_figure_whose_line_goes_through_its_frames(name):
     for point in [*world_to_frames(arm, q)[:, :3, 3], world_to_tool(arm, q)[:3, 3]]:
         assert np.abs(skeleton - point).max(axis=1).min() < ON_LINE
     spans = [np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())]
-    assert np.allclose(
-        spans / np.max(spans), axes._box_aspect / np.max(axes._box_aspect)
-    )  # one metre is one length
+    # One metre is one length.
+    assert np.allclose(spans / np.max(spans), axes._box_aspect / np.max(axes._box_aspect))
     assert "[m]" in axes.get_xlabel()
 
 

@@ -126,9 +126,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     clean_streams()
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
-    logging.getLogger("dhkit").setLevel(
-        logging.INFO
-    )  # messages about work that takes seconds, such as compiling
+    # Messages about work that takes seconds, such as compiling.
+    logging.getLogger("dhkit").setLevel(logging.INFO)
     degrees = DEGREES.set(False)
     as_designed = AS_DESIGNED.set(False)
     try:

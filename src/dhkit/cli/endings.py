@@ -25,9 +25,8 @@ def _interrupt(_: int, frame: FrameType | None) -> None:
     # A second signal would disturb the end that the first has begun.
     for number in END_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    interrupt = signal.getsignal(
-        signal.SIGINT
-    )  # raises KeyboardInterrupt where nothing discards it
+    # Raises KeyboardInterrupt where nothing discards it.
+    interrupt = signal.getsignal(signal.SIGINT)
     if not callable(interrupt):
         raise KeyboardInterrupt
     interrupt(signal.SIGINT, frame)

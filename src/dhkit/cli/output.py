@@ -83,9 +83,8 @@ def report_files(files: Iterable[object], *, json: bool) -> None:
 
 def print_json(value: object, indent: int | None = None) -> None:
     """Print a value as one JSON document, in which NaN and infinity are null."""
-    plain = (
-        "utf" not in (sys.stdout.encoding or "").lower()
-    )  # a letter that is replaced would be another text
+    # A letter that is replaced would be another text.
+    plain = "utf" not in (sys.stdout.encoding or "").lower()
     try:
         text = json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent)
         # Unsafe characters stand in strings alone, where JSON has escapes for them.

@@ -88,9 +88,8 @@ class StepKernel:
         numbers = {"setpoint": setpoint, **plant, "gains": law.gains}
         numbers["effort_limits"] = np.minimum(effort_limits, NO_LIMIT)
         model_pattern = ""
-        if list(arms) != [
-            law.description
-        ]:  # a controller whose model is the arm that moves shares its symbols
+        # A controller whose model is the arm that moves shares its symbols.
+        if list(arms) != [law.description]:
             model_pattern, numbers["model"] = inertial_pattern(law.description)
         return cls._of(f"{pattern} {law.name} {model_pattern}", numbers, arms, law)
 

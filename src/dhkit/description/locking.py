@@ -221,9 +221,8 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     first = next(place for place in range(description.n + 1) if place not in locked)
     inwards = sorted((place for place in locked if place > first), reverse=True)
     for place in range(first):
-        chain = _lock_one(
-            chain, description.convention, 0, locked[place], values
-        )  # those before it are gone
+        # Those before it are gone.
+        chain = _lock_one(chain, description.convention, 0, locked[place], values)
     for place in inwards:
         chain = _lock_one(chain, description.convention, place - first, locked[place], values)
     moving = [i for i in range(description.n) if i not in locked]

@@ -158,9 +158,8 @@ class _ElementReader:
         while offset < len(data):
             _require(len(data) - offset >= _TAG_LENGTH)
             kind, length = struct.unpack_from(f"{self.order}II", data, offset)
-            if (
-                kind >> 16
-            ):  # a small element: length and type share the first word, its data is the second
+            # A small element: length and type share the first word, its data is the second.
+            if kind >> 16:
                 length = kind >> 16
                 kind &= 0xFFFF
                 start = offset + _TAG_LENGTH // 2
@@ -274,9 +273,8 @@ class _ElementReader:
 
 def _name(element: _Element) -> str:
     name = element.data[: BOUNDS.mat_name_characters].decode("latin-1")
-    return (
-        name if name.isprintable() else ascii(name)[1:-1]
-    )  # messages have one line, whatever the file holds
+    # Messages have one line, whatever the file holds.
+    return name if name.isprintable() else ascii(name)[1:-1]
 
 
 def _next(parts: Iterator[_Element]) -> _Element:

@@ -179,9 +179,8 @@ class Symbolic:
         names = {name: name for name in ELEMENTARY.split()} | INVERSES
         for name, own in names.items():
             self._add_method(name, getattr(self.sympy, own))
-            for math_name in {name, own} & set(
-                dir(math)
-            ):  # math has asin, as sympy has, and not arcsin
+            # math has asin, as sympy has, and not arcsin.
+            for math_name in {name, own} & set(dir(math)):
                 setattr(
                     math,
                     math_name,

@@ -57,9 +57,8 @@ def main(arguments: list[str]) -> NoReturn:
             prctl = ctypes.CDLL(None).prctl
             if os.path.basename(program[0]) != "bwrap":  # noqa: PTH119 - which sets it itself, and may need rights
                 prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
-            prctl(
-                DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0
-            )  # when dhkit dies; a change of the user would undo it
+            # When dhkit dies; a change of the user would undo it.
+            prctl(DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
         os.execvp(program[0], program)  # noqa: S606 - no shell is wanted
     except OSError as error:
         os.write(2, f"{program[0]}: {error.strerror}\n".encode())

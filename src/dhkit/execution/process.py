@@ -302,9 +302,8 @@ class Process:
             Failure.GARBAGE: "wrote something that is not an answer",
         }
         if self.failure is Failure.ENDED:
-            self._drained.wait(
-                _LAST_WORDS_TIME
-            )  # its last words may come after the news of its end
+            # Its last words may come after the news of its end.
+            self._drained.wait(_LAST_WORDS_TIME)
         lines = self.output().strip().splitlines() if self.failure is Failure.ENDED else []
         last_line = f": {printable(lines[-1])[:200]}" if lines else ""
         return ProgramError(texts[self.failure] + last_line, self.failure)
@@ -313,9 +312,8 @@ class Process:
         """Return the status or the signal that the program ended with, as text; empty if it still runs."""
         with suppress(subprocess.TimeoutExpired):
             status = self._process.wait(_EXIT_DELAY)
-            number = (
-                -status if status < 0 else status - 128
-            )  # bubblewrap tells a signal as a shell does
+            # Bubblewrap tells a signal as a shell does.
+            number = -status if status < 0 else status - 128
             if number > 0:
                 with suppress(ValueError):
                     return f" by {signal.Signals(number).name}"

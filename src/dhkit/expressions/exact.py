@@ -58,10 +58,11 @@ class Atom:
         return self._hash
 
     def __reduce__(self) -> tuple[type[Atom], tuple[str, tuple[Expression, ...]]]:
+        # Without the cached hash, which differs from process to process.
         return Atom, (
             self.name,
             self.arguments,
-        )  # without the cached hash, which differs from process to process
+        )
 
     @property
     def is_symbol(self) -> bool:

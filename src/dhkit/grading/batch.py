@@ -179,9 +179,8 @@ class _Pool:
             return []
         now = time.monotonic()
         workers = {number: worker for number, (_, worker) in self.running.items()}
-        for (
-            worker
-        ) in workers.values():  # while the caller was busy, no process could hand in its report
+        # While the caller was busy, no process could hand in its report.
+        for worker in workers.values():
             worker.deadline += max(0.0, now - max(self._waited, worker.begin))
         patience = min(worker.deadline for worker in workers.values()) - now
         done = []

@@ -202,7 +202,8 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
         ValueError,
         OSError,
         RuntimeError,
-    ):  # a NUL in the name, a name that is too long, a link to itself
+    ):
+        # A NUL in the name, a name that is too long, a link to itself.
         raise AnswerError(f"{place}: {name[:60]!r} is not a file name") from None
     if not path.is_relative_to(inside):
         raise AnswerError(f"{place}: {name!r} leaves the sheet's folder; expected a file in it")

@@ -180,9 +180,8 @@ def _run(end: int, work: Callable[[], bytes], limits: WorkerLimits) -> NoReturn:
     try:
         with contextlib.suppress(OSError):
             os.setpgid(0, 0)
-        end = fcntl.fcntl(
-            end, fcntl.F_DUPFD_CLOEXEC, 3
-        )  # a parent without an input gives the pipe the number 0
+        # A parent without an input gives the pipe the number 0.
+        end = fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 3)
         _close_files(end)
         _set_limits(limits)
         text = memoryview(work())

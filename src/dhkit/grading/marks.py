@@ -162,9 +162,8 @@ def _reasons(
 def _mistake_share(diagnosis: Diagnosis, credit: Credit, otherwise: float) -> float:
     """Return the rubric's share for a mistake, or for an equivalent one that gets more."""
     names = (str(diagnosis.mistake), *diagnosis.equivalent)
-    bare = [
-        name if name in credit.mistakes else name.partition(" (")[0] for name in names
-    ]  # half_forgotten (link 2)
+    # half_forgotten (link 2).
+    bare = [name if name in credit.mistakes else name.partition(" (")[0] for name in names]
     return max(
         (credit.mistakes[name] for name in bare if name in credit.mistakes), default=otherwise
     )

@@ -29,9 +29,8 @@ class Stage:
     ) -> None:
         """Write the outputs (items, ...) of parameters (p,) and inputs (items, ...), in the units of the program."""
         self.parameters[...] = parameters
-        for k, staged in enumerate(
-            self.inputs
-        ):  # for single items, zip(strict=True) would take as long as a copy
+        # For single items, zip(strict=True) would take as long as a copy.
+        for k, staged in enumerate(self.inputs):
             staged[...] = inputs[k]
         self.run()
         for k, staged in enumerate(self.outputs):

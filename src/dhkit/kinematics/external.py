@@ -118,9 +118,8 @@ def _with_restarts(
         Solutions, shape (K, n), and the indices of their poses, shape (K,).
     """
     rng = np.random.default_rng(0)
-    has_curves = (
-        freedoms(description, "whole") < description.n
-    )  # infinitely many solutions: one is enough
+    # Infinitely many solutions: one is enough.
+    has_curves = freedoms(description, "whole") < description.n
     waiting = rows
     for _ in range(_MAX_ROUNDS):
         if has_curves:

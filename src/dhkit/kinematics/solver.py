@@ -96,9 +96,8 @@ def solve_in_closed_form(
         solver.kernel(
             solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads
         )
-        is_one_in_reach = (
-            count == 1 and distance.item() == 0.0
-        )  # a single call has no time to look for others
+        # A single call has no time to look for others.
+        is_one_in_reach = count == 1 and distance.item() == 0.0
         if fit.ring is not None and fit.parameters["offset"] and not is_one_in_reach:
             # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
             beyond = np.flatnonzero(distance.reshape(count) > 0)

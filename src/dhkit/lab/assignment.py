@@ -496,9 +496,8 @@ def _tool_at(arm: Arm, form: PoseForm, tolerance: ToleranceForm, place: str) -> 
         (form.euler is not None and arm.n >= 6) or set(fit.coordinates) <= {"x", "y", "z"}
     ):
         solutions = arm.ik(T)
-        is_near = (
-            0 < float(solutions.distance) <= tolerance.position
-        )  # beyond the workspace by less than the tolerance
+        # Beyond the workspace by less than the tolerance.
+        is_near = 0 < float(solutions.distance) <= tolerance.position
         if not is_near and not bool(np.any(solutions.valid & solutions.allowed)):
             problem = (
                 "in reach only outside the joint limits"

@@ -92,9 +92,8 @@ class Live:
         """
         self._plant = Plant(plant.description, friction, 0.0, self._pushes)
         state = self._state
-        self._begin_record(
-            State(state.t, state.q, state.qd, state.memory)
-        )  # the new record has done no work yet
+        # The new record has done no work yet.
+        self._begin_record(State(state.t, state.q, state.qd, state.memory))
 
     def push(self, link: int | None, force: Array, duration: float) -> None:
         """Push from now on for a duration, s.

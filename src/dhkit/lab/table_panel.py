@@ -256,9 +256,8 @@ class TablePanel(Panel):
                     (int(i), int(k)): f"{COLUMNS[k]}: beyond {MAX_ENTRY:g}" for k, i in beyond
                 }
                 return Table(texts, last, too_large)
-            first = (
-                self._first.description
-            )  # who types the first arm's numbers again has it again, with its meshes
+            # Who types the first arm's numbers again has it again, with its meshes.
+            first = self._first.description
             return Table(texts, first if description == _without_meshes(first) else description)
         except (DhkitError, ValueError) as error:
             changed = np.argwhere(np.array(texts) != np.array(self._table.texts))

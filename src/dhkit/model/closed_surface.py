@@ -220,9 +220,8 @@ def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     reversed_keys = (keys % count) * count + keys // count
     places = np.minimum(np.searchsorted(keys, reversed_keys), len(keys) - 1)
     missing = times - np.where(keys[places] == reversed_keys, times[places], 0)
-    rim = np.repeat(
-        keys, np.maximum(missing, 0)
-    )  # edges that are passed more often than their reversed ones
+    # Edges that are passed more often than their reversed ones.
+    rim = np.repeat(keys, np.maximum(missing, 0))
     start = rim // count
     end = rim % count
 

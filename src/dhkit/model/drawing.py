@@ -180,9 +180,8 @@ def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
         if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
             radius = min(radius, _NESTED_RADIUS * joints[-1].radius)
             half = max(half, _NESTED_HALF_HEIGHT * joints[-1].extent / _HUB_HALF_LENGTH)
-        if (
-            not joints and abs(after.d) > radius
-        ):  # frame 0 is on the floor: the drum stands on it, not in it
+        # Frame 0 is on the floor: the drum stands on it, not in it.
+        if not joints and abs(after.d) > radius:
             half = min(half, _MAX_FIRST_DRUM_HALF * abs(after.d))
             lift = float(np.copysign(_HUB_HALF_LENGTH * half, after.d))
         if not prismatic:

@@ -67,9 +67,8 @@ def example_robots() -> dict[str, Path]:
     paths = sorted(
         Path(str(file.locate())).resolve() for file in files if file.name.endswith(".urdf")
     )
-    paths = [
-        path for path in paths if b"<link" in path.read_bytes()
-    ]  # ur3.urdf is a robot without links
+    # ur3.urdf is a robot without links.
+    paths = [path for path in paths if b"<link" in path.read_bytes()]
     stems = [_without_ending(path.stem) for path in paths]
     # anymal.urdf lies in the folders of two robots
     named = {

@@ -69,7 +69,8 @@ class MeshFinder:
             OSError,
             RuntimeError,
             ValueError,
-        ):  # a loop of links, or a name that no file can have
+        ):
+            # A loop of links, or a name that no file can have.
             raise ModelError(f"{mesh} cannot be found") from None
         if not any(file.is_relative_to(root) for root in (self.root, *self.package_dirs)):
             raise ModelError(f"{mesh} lies outside the robot's folder {self.root}")

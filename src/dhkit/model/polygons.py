@@ -56,9 +56,8 @@ def _normals(points: Array) -> Array:
 
 def _is_concave(points: Array) -> NDArray[np.bool_]:
     """Return which polygons, points of shape (p, k, 3), have a concave corner."""
-    with np.errstate(
-        invalid="ignore", over="ignore"
-    ):  # coordinates that are not finite are refused later
+    # Coordinates that are not finite are refused later.
+    with np.errstate(invalid="ignore", over="ignore"):
         edges = np.roll(points, -1, axis=1) - points
         turns = np.einsum(
             "pki,pi->pk", np.cross(edges, np.roll(edges, -1, axis=1)), _normals(points)

@@ -169,9 +169,8 @@ def with_drawn_shapes(description: Description) -> Description:
             Shape(part.geometry, placement_of_pose(part.T_link_part, "shape"), part.color)
             for part in others
         )
-        explicit.append(
-            given if here else (*given, *solids)
-        )  # meshes that cannot be read stay missing
+        # Meshes that cannot be read stay missing.
+        explicit.append(given if here else (*given, *solids))
     base, *links, at_tool = explicit
     if not described[-1]:  # drawn in the frame of the last link
         links[-1] = (*links[-1], *at_tool)

@@ -503,9 +503,8 @@ def _make_movable(joint: Element, axis: Array) -> None:
     if element is not None and not math.isclose(
         math.hypot(*map(float, element.get("xyz", "1 0 0").split())), 1, rel_tol=0.01
     ):
-        element.set(
-            "xyz", " ".join(repr(float(x)) for x in axis)
-        )  # squares of long ones overflow in other readers
+        # Squares of long ones overflow in other readers.
+        element.set("xyz", " ".join(repr(float(x)) for x in axis))
     if joint.get("type") == JointKind.CONTINUOUS:
         joint.set("type", JointKind.REVOLUTE)
     _remove_all(joint, "limit", "safety_controller", "calibration")

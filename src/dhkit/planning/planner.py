@@ -378,9 +378,8 @@ class Planner:
                 reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
             try:
-                if (
-                    route.label
-                ):  # a chosen branch; the places of a single route were checked by require_possible
+                # A chosen branch; the places of a single route were checked by require_possible.
+                if route.label:
                     last = len(route.points) - 1
                     for k, point in enumerate(route.points[1:], start=1):
                         require_place(

@@ -60,9 +60,8 @@ def score_inverse(
     regular = [judge.solve(T) for T in arm.fk(regular_states(arm, rng, samples))]
     seconds = np.median(call.seconds) if call.seconds else np.inf
     unreachable = poses_out_of_reach(arm, rng, max(1, round(_OUT_OF_REACH_SHARE * samples)))
-    empty = [
-        judge.returns_nothing(T) for T in unreachable
-    ]  # none where an unlimited slide reaches everything
+    # None where an unlimited slide reaches everything.
+    empty = [judge.returns_nothing(T) for T in unreachable]
     right = [pose.is_right for pose in regular]
     # A program that returns nothing for any pose has not recognised those out of reach.
     share = float(np.mean([*right, *empty])) if any(right) else 0.0

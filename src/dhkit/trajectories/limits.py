@@ -48,9 +48,8 @@ class Limits:
             if array.shape != (n,):
                 raise ValueError(f"{item.name} has shape {array.shape}; expected ({n},)")
             bounds = item.name in ("lower", "upper")
-            nowhere = {"lower": np.inf, "upper": -np.inf}.get(
-                item.name
-            )  # no joint value is allowed
+            # No joint value is allowed.
+            nowhere = {"lower": np.inf, "upper": -np.inf}.get(item.name)
             wrong = np.isnan(array) | (array == nowhere) if bounds else ~(array > 0)
             if wrong.any():
                 i = int(np.flatnonzero(wrong)[0])

@@ -43,9 +43,8 @@ def parse_message(text: str) -> dict[str, Any]:
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):
                 value = _value(next(events), events, 0)
-                if (
-                    message is not None and value
-                ):  # ROS ends a message with ---, which begins an empty document
+                # ROS ends a message with ---, which begins an empty document.
+                if message is not None and value:
                     raise _UnexpectedError(event, "one message, not several")
                 message = value if message is None else message
     except _UnexpectedError as error:

@@ -66,9 +66,8 @@ def part_transform(part: Part) -> Array:
     """
     T = part.T_link_part.copy()
     if isinstance(part.geometry, Mesh):
-        T[:3, :3] *= [
-            float(factor) for factor in part.geometry.scale
-        ]  # may mirror: both sides are drawn
+        # May mirror: both sides are drawn.
+        T[:3, :3] *= [float(factor) for factor in part.geometry.scale]
     if isinstance(part.geometry, Cylinder | Capsule):
         T = np.matmul(T, _Y_TO_Z)
     return T
@@ -86,9 +85,8 @@ def triad_object(length: float, name: str) -> Lowered:
     """
     meshcat = _meshcat()
     vertices, faces = _arrow()
-    along = [
-        np.roll(vertices, axis, axis=1) for axis in range(3)
-    ]  # a cyclic change of axes keeps the triangles' sense
+    # A cyclic change of axes keeps the triangles' sense.
+    along = [np.roll(vertices, axis, axis=1) for axis in range(3)]
     geometry = meshcat.TriangularMeshGeometry(
         length * np.concatenate(along),
         np.concatenate([faces + axis * len(vertices) for axis in range(3)]),
@@ -130,9 +128,8 @@ def grid_object(size: float, name: str) -> Lowered:
     x, y = np.meshgrid(along, across)
     line = np.stack([x, y, np.zeros_like(x)], axis=-1)
     segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 3)
-    segments = segments[
-        np.linalg.norm(segments, axis=2).min(axis=1) < half
-    ]  # the corners are fully faded
+    # The corners are fully faded.
+    segments = segments[np.linalg.norm(segments, axis=2).min(axis=1) < half]
     points = np.concatenate([segments, segments[..., [1, 0, 2]]]).reshape(-1, 3)
     opacity = np.clip(1 - np.hypot(points[:, 0], points[:, 1]) / half, 0, 1)
     colors = np.concatenate([np.ones((3, len(points))), opacity[None]])

@@ -220,9 +220,8 @@ def _triangles(part: Part) -> Array:
             mesh = trimesh.creation.uv_sphere(1.0, count=[_ROUND_SIDES // 2, _ROUND_SIDES])
             scale = float(shape.radius)
         case Cylinder():
-            scale = float(
-                shape.radius
-            )  # of unit size, since trimesh merges points nearer than 1e-8
+            # Of unit size, since trimesh merges points nearer than 1e-8.
+            scale = float(shape.radius)
             mesh = trimesh.creation.cylinder(
                 1.0, float(shape.length) / scale, sections=_ROUND_SIDES
             )

@@ -229,9 +229,8 @@ def derivation(w):
             omega=lambda k, omega, i=i, robot=robot: _own_rate(omega, k, robot) if k == i else omega
         )
         if robot != "cart_double":
-            split = (
-                {"parameter_forgotten"} if robot == "payload2r" else set()
-            )  # the file's link 2 carries the payload
+            # The file's link 2 carries the payload.
+            split = {"parameter_forgotten"} if robot == "payload2r" else set()
             w.derived(
                 "omega_of_own_joint",
                 robot,

@@ -39,9 +39,8 @@ def reached(arm, formulas, T):
     values |= dict(zip(("px", "py", "pz"), T[:3, 3], strict=True)) | dict(d1=0.1, a2=0.2, a3=0.15)
     q = np.zeros(arm.n)
     for joint, formula in formulas:
-        q[joint - 1] = eval(
-            formula.replace("^", "**"), {"__builtins__": {}}, values
-        )  # our own formulas
+        # Our own formulas.
+        q[joint - 1] = eval(formula.replace("^", "**"), {"__builtins__": {}}, values)
         values |= {
             f"q{joint}": q[joint - 1],
             f"s{joint}": np.sin(q[joint - 1]),

@@ -84,11 +84,12 @@ def test_every_mistake_can_be_provoked():
     """By a variant on a robot of the corpus, by a slip below, or by the tests of tables and of inverse kinematics."""
     tables = [variants_of(truth_of(corpus_robot(robot)), frozenset()) for robot in ROBOTS]
     made = {variant.identity for variants in tables for variant in variants.dynamic}
+    # Tests/grading/test_findings.py.
     friction = {
         "friction_forgotten",
         "friction_sign",
         "friction_gear",
-    }  # tests/grading/test_findings.py
+    }
     absolute = {"relative_for_absolute", "motor_torques"}
     tests = {*KINEMATIC_MISTAKES, *JACOBIAN, *TABLE, *INVERSE, *SLIPS, *friction, *absolute}
     bodies = {

@@ -78,9 +78,8 @@ def test_the_original_is_among_the_branches_and_they_are_distinct(name, law):
             FOUND,
             (name, q[nearest.argmax()]),
         )
-        one_shoulder = (
-            along_plane(arm, q) < REGULAR
-        )  # of an arm with an offset: left and right are then the same
+        # Of an arm with an offset: left and right are then the same.
+        one_shoulder = along_plane(arm, q) < REGULAR
         for i in range(8):
             for j in range(i):
                 apart = gaps(arm, solutions.q[:, i], solutions.q[:, j])
@@ -114,10 +113,11 @@ def test_every_branch_closes_at_singularities_and_is_flagged(name, kind, law):
     for start in range(0, total, CHUNK):
         count = min(CHUNK, total - start)
         q = singular_configurations(arm, kind, count, seed=start)
+        # Six joints together then miss the singularity by at most NEAR.
         for size in (
             0.0,
             NEAR / 6,
-        ):  # six joints together then miss the singularity by at most NEAR
+        ):
             near = q + size * rng.uniform(-1, 1, q.shape)
             if kind != "shoulder":
                 assert measures(arm, near)[kind].max() < 2 * NEAR
@@ -254,9 +254,8 @@ def test_any_arm_of_the_pumas_family(law, arm):
 
 @given(arm=three_parallel_arms())
 def test_any_arm_of_the_urs_family(law, arm):
-    check_family(
-        law, arm, ["three_parallel", "elbow_wrist"], OTHERS_CLOSE
-    )  # without d5 the wrist is spherical
+    # Without d5 the wrist is spherical.
+    check_family(law, arm, ["three_parallel", "elbow_wrist"], OTHERS_CLOSE)
 
 
 @given(arm=slide_arms())

@@ -300,9 +300,8 @@ def test_as_designed_reads_rounded_right_angles(tmp_path):
     (tmp_path / "arm.urdf").write_text(urdf_of(joints))
     written = extract_dh(tmp_path / "arm.urdf", convention="modified")
     assert written.residual.largest < 5e-10
-    assert (
-        1e-7 < np.abs(written.description.numbers.d[1]) < 1e-5
-    )  # a micrometre, as the file has it
+    # A micrometre, as the file has it.
+    assert 1e-7 < np.abs(written.description.numbers.d[1]) < 1e-5
     designed = extract_dh(tmp_path / "arm.urdf", convention="modified", as_designed=True)
     assert designed.description.numbers.d.tolist() == [0.333, 0, 0.316, 0, 0.384, 0, 0]
     assert len(designed.changes) == 6

@@ -64,9 +64,8 @@ def test_segments_against_sampling():
     rng = np.random.default_rng(0)
     pairs = rng.uniform(-1, 1, (60, 2, 2, 3))
     pairs[:10, 1, 1] = pairs[:10, 1, 0]  # points
-    pairs[10:20, 1, 1] = pairs[10:20, 1, 0] + 0.7 * (
-        pairs[10:20, 0, 1] - pairs[10:20, 0, 0]
-    )  # parallel
+    # Parallel.
+    pairs[10:20, 1, 1] = pairs[10:20, 1, 0] + 0.7 * (pairs[10:20, 0, 1] - pairs[10:20, 0, 0])
     pairs[20:25, 1] = pairs[20:25, 0]  # one and the same
     for first, second in pairs:
         sampled, step = by_sampling(first, second)

@@ -80,9 +80,8 @@ def test_planes_have_the_obstacle_on_one_side_and_the_link_on_the_other(ur5):
         clear = gaps.gap[:, p] > 1e-6
         n, level = gaps.normal[clear, p], gaps.level[clear, p]
         np.testing.assert_allclose(np.linalg.norm(n, axis=1), 1.0, atol=1e-12)
-        if (
-            pair.obstacle is None
-        ):  # the plane touches the first link, in its frame, and the other is beyond
+        # The plane touches the first link, in its frame, and the other is beyond.
+        if pair.obstacle is None:
             frame = world_to_frames(ur5, q[clear])[:, capsules[pair.capsule].link]
             first, second = (
                 np.einsum(

@@ -44,9 +44,8 @@ def _single(workload: Workload) -> Task:
 
 def _batch(workload: Workload) -> Task:
     robot, axes = _solver(workload)
-    poses = list(
-        axes.without_tool_rotation(workload.T)
-    )  # the call would convert an array into a list
+    # The call would convert an array into a list.
+    poses = list(axes.without_tool_rotation(workload.T))
 
     def prepare(items: int) -> Call:
         chosen = poses[:items]

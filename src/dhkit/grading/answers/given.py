@@ -423,9 +423,8 @@ def _read(index: tuple[int, ...], value: Answer, vocabulary: Vocabulary) -> Give
     if isinstance(value, str) and not value.strip():
         return Given(index, "", error=LEFT_EMPTY)
     try:
-        if isinstance(value, str) and not is_pretty(
-            value
-        ):  # in which the spaces of the first line count
+        # In which the spaces of the first line count.
+        if isinstance(value, str) and not is_pretty(value):
             value = value.strip().rstrip(";,")
         return Given(index, *entry_tree(value, vocabulary))
     except AnswerError as error:

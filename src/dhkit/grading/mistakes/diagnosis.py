@@ -303,9 +303,8 @@ class _Pairs:
 
 
 @lru_cache(maxsize=32)
-def variants_of(
-    truth: Truth, numbers: frozenset[str]
-) -> Variants:  # without a default, which has a key of its own
+# Without a default, which has a key of its own.
+def variants_of(truth: Truth, numbers: frozenset[str]) -> Variants:
     """Return the mistakes on a robot; the same object each time, so that nothing is derived twice."""
     return Variants(truth, numbers)
 

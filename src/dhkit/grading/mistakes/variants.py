@@ -100,9 +100,8 @@ class Variant:
     place: str = ""
     rarity: int = 0
     is_kinematic: bool = False
-    _changes: dict[tuple[str, Coordinates], Elements] = field(
-        default_factory=dict, repr=False
-    )  # a cache
+    # A cache.
+    _changes: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)
 
     @property
     def identity(self) -> str:

@@ -51,9 +51,8 @@ def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
     entries = []
     for entry in report.entries:
         shown = replace(entry, difference=None, difference_latex="", witness=None)
-        if not (
-            hints and entry.verdict.passes
-        ):  # the statement on a wrong entry may say by how much it is wrong
+        # The statement on a wrong entry may say by how much it is wrong.
+        if not (hints and entry.verdict.passes):
             shown = replace(shown, statement="")
         entries.append(shown if hints else replace(shown, latex="", follows=""))
     return replace(

@@ -97,9 +97,8 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
 
     # In the normal's axes the base's x axis is (c, -s, 0): it is parallel to the part of t across z.
     across = R.T @ t
-    thetas += _and_opposite(
-        -np.arctan2(across[1], across[0])
-    )  # the base's x axis points at the first axis
+    # The base's x axis points at the first axis.
+    thetas += _and_opposite(-np.arctan2(across[1], across[0]))
     return min(_modified_starts(R, t, z, thetas), key=itemgetter(0))
 
 
@@ -174,12 +173,10 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
     if with_theta:
         thetas += _and_opposite(np.arctan2(R[1, 0], R[0, 0]))  # the tool's yaw is 0 if alpha is
         thetas += _quarters(np.arctan2(t[1], t[0]))  # p_y is 0, or p_x, which is the entry a
-        thetas += _and_opposite(
-            np.arctan2(R[0, 2], -R[1, 2])
-        )  # the tool rotates about x and then z
-        thetas += _and_opposite(
-            np.arctan2(-R[0, 1], R[1, 1])
-        )  # the tool rotates about x and then y
+        # The tool rotates about x and then z.
+        thetas += _and_opposite(np.arctan2(R[0, 2], -R[1, 2]))
+        # The tool rotates about x and then y.
+        thetas += _and_opposite(np.arctan2(-R[0, 1], R[1, 1]))
     for theta in thetas:
         back = _rotations(2, np.array([-theta]))[0]
         P = back @ R

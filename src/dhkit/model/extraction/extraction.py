@@ -139,9 +139,8 @@ def extract_dh(
     if convention not in known:
         raise ModelError(f"convention is {convention!r}; expected one of {', '.join(known)}")
     chain = read_chain(path, base, tip, side=side, as_designed=as_designed)
-    if (
-        chain.tree.changes
-    ):  # the file as written is checked too: changes must not hide a wrong reading
+    # The file as written is checked too: changes must not hide a wrong reading.
+    if chain.tree.changes:
         Original(read_chain(path, chain.base, chain.tip, side=side)).check_reading()
     return extracted(
         chain, convention=Convention(convention), exact=exact, package_dirs=package_dirs, name=name

@@ -433,9 +433,8 @@ def _with_peaks_between(use: Array, points: int) -> Array:
 
 def _check(constraint: Constraint, limit: int, excess: Array, times: Array) -> Check:
     """Return the check of a constraint with excesses (N, k) at times (N,), s: the largest one."""
-    excess = np.where(
-        np.isnan(excess), np.inf, excess
-    )  # a limit whose use is not a number is not kept
+    # A limit whose use is not a number is not kept.
+    excess = np.where(np.isnan(excess), np.inf, excess)
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     return Check(
         constraint.what, float(excess[k, i]), int(i), float(times[k]), constraint.of_joints, limit

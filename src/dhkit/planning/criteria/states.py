@@ -210,9 +210,8 @@ class States:
         slower = replace(
             self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3
         )
-        slower = replace(
-            slower, motion=None
-        )  # their joint values are the same, and so is the clearance
+        # Their joint values are the same, and so is the clearance.
+        slower = replace(slower, motion=None)
         known: dict[str, Any] = slower.__dict__
         if "_rigid" in self.__dict__:
             known["_rigid"] = self.gravity_torque + (self._rigid - self.gravity_torque) / c**2

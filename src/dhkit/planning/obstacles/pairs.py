@@ -253,9 +253,8 @@ def _axes_with_locked_joints_turned(description: Description, q: Array) -> Array
             for i, body in enumerate(bodies):
                 if body.link > link or (body.link == link and body.number >= joint):
                     carried.append(i)
-            if (
-                T is None
-            ):  # of a link without shapes: its axis is not known, and all links after it move
+            # Of a link without shapes: its axis is not known, and all links after it move.
+            if T is None:
                 size = float(np.ptp(axes.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
                 axes[:, carried] += rng.uniform(-size, size, (count, 1, 1, 3))
                 continue

@@ -319,9 +319,8 @@ class Solids:
 
             h(n) = n . c + sum_a |n . e_a| + r.
         """
-        halves = (
-            self.placements[which, :3, :3] * self.half_sizes[which, None]
-        )  # half edges, as columns
+        # Half edges, as columns.
+        halves = self.placements[which, :3, :3] * self.half_sizes[which, None]
         along = np.abs(np.einsum("ix,jxa->ija", normals, halves)).sum(axis=2)
         reach: Array = normals @ self.centres[which].T + along + self.radii[which]
         return reach

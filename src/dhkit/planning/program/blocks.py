@@ -246,9 +246,8 @@ class BlockProgram:
                 values = function.hessian.map(points)(
                     *local, of_rows, casadi.repmat(weight, 1, points)
                 )
-                hessian.add(
-                    np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values
-                )  # the upper triangle
+                # The upper triangle.
+                hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)
             begin += block.count
         scaled_rows = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
 

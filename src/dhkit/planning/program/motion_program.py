@@ -205,9 +205,8 @@ class MotionProgram(OptimizationProgram[Knots]):
         is_compared = has_detours and task.objective.has_time and task.span >= USUAL_MOVE
         durations = self.guessed_durations(task)
         guesses: list[Callable[[], Knots]] = []
-        if (
-            warm is not None and len(self.mesh.legs) == 1
-        ):  # the times of via points in ``warm`` are not known
+        # The times of via points in ``warm`` are not known.
+        if warm is not None and len(self.mesh.legs) == 1:
             guesses.append(partial(knots_along, warm, self.mesh, np.array([warm.duration])))
         guesses.append(partial(straight_knots, task, self.mesh, durations))
         if is_compared or task.duration is not None:

@@ -210,9 +210,8 @@ def delayed_interrupts() -> Iterator[list[BaseException]]:
 
     def keep(number: int, frame: FrameType | None) -> None:
         try:
-            handler(
-                number, None
-            )  # without the frame: wherever it is, what the handler raises is not lost
+            # Without the frame: wherever it is, what the handler raises is not lost.
+            handler(number, None)
         except BaseException as error:
             arrived.append(error)
 

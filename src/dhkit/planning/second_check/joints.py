@@ -134,9 +134,8 @@ def _torques(
         qd = derivative(motion, at, 1)
         qdd = derivative(motion, at, 2)
         tau = np.array([pin.rnea(model, data, *state) for state in zip(q, qd, qdd, strict=True)])
-        tau += (
-            qdd @ numbers.coupling
-        )  # of drives that two joints turn; Pinocchio has no place for it
+        # Of drives that two joints turn; Pinocchio has no place for it.
+        tau += qdd @ numbers.coupling
         if friction is not None:
             # s goes from -1 to 1 with the direction of motion; dry friction is c+ at s = 1 and c- at s = -1:
             #   viscous qd + (c+ - c-) / 2 s + (c+ + c-) / 2 s^2.

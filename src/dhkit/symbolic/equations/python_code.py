@@ -97,9 +97,8 @@ def _function(functions: FunctionSet, function: Function) -> Iterator[str]:
     yield f"    {quantity.name} = np.zeros((*q.shape[:-1]{shape or ','}))"
     for entry in function.entries:
         yield from python_lines(entry, "    ")
-    yield f"    return {quantity.name}" + (
-        "" if shape else "[()]"
-    )  # V[()]: a number where V has no axes
+    # V[()]: a number where V has no axes.
+    yield f"    return {quantity.name}" + ("" if shape else "[()]")
 
 
 def inverse_python(derivation: InverseDerivation) -> dict[str, str]:

@@ -366,11 +366,12 @@ class _Builder:
 
     def add(self, node: Node) -> int:
         """Return the number of a node, which is appended unless an equal one is there."""
+        # NaN differs from itself; as text all NaN are equal.
         key = (
             node.operation,
             node.arguments,
             repr(node.value),
-        )  # NaN differs from itself; as text all NaN are equal
+        )
         if key not in self._places:
             self._places[key] = len(self.nodes)
             self.nodes.append(node)

@@ -253,9 +253,8 @@ def translated(
                 moved[targets[k]] = monomial[k]
         parts.setdefault(replaced, {})[tuple(moved)] = coefficient
 
-    powers: dict[
-        tuple[int, int], Element
-    ] = {}  # powers of replacements so far, by index and exponent
+    # Powers of replacements so far, by index and exponent.
+    powers: dict[tuple[int, int], Element] = {}
     total = []
     for exponents, group in parts.items():
         product = ring.one

@@ -78,9 +78,8 @@ def statement_of(
     """
     if len(sides) == 1 or not names[0]:
         return Statement(line, (), tuple(sides), problem, text)
-    is_target = [_is_also(name, names[0]) for name in names[:-1]] + [
-        False
-    ]  # the last side is a formula
+    # The last side is a formula.
+    is_target = [_is_also(name, names[0]) for name in names[:-1]] + [False]
     targets = dict.fromkeys(name for name, is_name in zip(names, is_target, strict=True) if is_name)
     formulas = tuple(side for side, is_name in zip(sides, is_target, strict=True) if not is_name)
     return Statement(line, tuple(targets), formulas, problem, text)

@@ -282,9 +282,8 @@ class _ExecutedProgram:
                 )
             except ProgramError as error:
                 problem = problem or self.error_text(error)
-                if (
-                    error.failure is not Failure.RAISED
-                ):  # it hangs, or has ended: nothing else is called with symbols
+                # It hangs, or has ended: nothing else is called with symbols.
+                if error.failure is not Failure.RAISED:
                     self._ended = f"after {function.name}: {problem}"
                     raise UnreadError(f"{function.name}(...): {problem}") from None
                 continue
@@ -503,9 +502,8 @@ class _SampledFunction(SampledAnswer):
         for other in self.others:
             if not _are_same(other._own_values(states, shape), values):
                 raise AnswerError(f"{self.name} and {other.name} give different values; keep one")
-        if self.local and self.program.child.name.endswith(
-            ".py"
-        ):  # of Octave's functions the locals are the results
+        # Of Octave's functions the locals are the results.
+        if self.local and self.program.child.name.endswith(".py"):
             self._refuse_changed(states, values)
         return values
 

@@ -68,9 +68,8 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
     match function, arguments:
         case ("zeros", [Several(())]):  # zeros((*q.shape[:-1],)): one number a state
             return Matrix({}, is_zeros=True)
-        case ("zeros", [Scalar() as n]) if (
-            not of_numpy and n.text.isdecimal()
-        ):  # sympy's and MATLAB's are square
+        case ("zeros", [Scalar() as n]) if not of_numpy and n.text.isdecimal():
+            # sympy's and MATLAB's are square.
             return zeros(int(n.text[:6]), int(n.text[:6]))
         case ("zeros", _) if arguments:
             return zeros(*_shape_of(arguments), multiplies_entries=of_numpy)

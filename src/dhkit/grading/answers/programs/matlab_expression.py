@@ -244,9 +244,8 @@ class MatlabExpression:
             and name not in self.program.assigned_names
             and self.scope.owner(name) is None
         ):
-            self.scope.value(
-                name
-            )  # notes that the name is read, so that binding it later is refused
+            # Notes that the name is read, so that binding it later is refused.
+            self.scope.value(name)
             return Library(name)
         return self.scope.value(name)
 
@@ -294,9 +293,8 @@ class MatlabExpression:
                 column_places = _places_within(columns, n)
                 if row_places is not None and column_places is not None:
                     return matrix_of(value.part(row_places, column_places))
-            case Matrix(), [range() as one] if one and (
-                value.is_flat or 1 in value.shape
-            ):  # v(1:2)
+            case Matrix(), [range() as one] if one and (value.is_flat or 1 in value.shape):
+                # v(1:2).
                 entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in one]
                 # A vector that was assigned entry by entry is a row in MATLAB.
                 is_row = value.is_flat or value.shape[0] == 1

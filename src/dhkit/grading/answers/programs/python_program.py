@@ -804,9 +804,8 @@ class PythonProgram:
             and 1 not in value.shape
         ):
             k = numbers[0]
-            if not (
-                value.multiplies_entries or value.is_list
-            ):  # sympy and casadi count through the matrix
+            # sympy and casadi count through the matrix.
+            if not (value.multiplies_entries or value.is_list):
                 return scope.scalar(_entry_counted(value, k))
             if k >= len(value.rows):
                 raise UnreadError(f"{self._quote(index)} is an index that the matrix does not have")
