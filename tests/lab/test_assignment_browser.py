@@ -74,7 +74,7 @@ def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
         False,
         False,
     ]
-    assert page.evaluate(WORDS) == [["open"] * count for count in (2, 2, 4, 3)]
+    assert page.evaluate(WORDS) == [["to do"] * count for count in (2, 2, 4, 3)]
     page.click("document.querySelector('.tasks details:nth-child(2) summary')")
     page.click(
         "[...document.querySelectorAll('.tasks button')].find(b => b.offsetWidth && /DH table/.test(b.textContent))"
@@ -89,7 +89,7 @@ def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
     page.write("90")
     page.until("/^Done: Links 1 to 6/.test(document.querySelector('#lab .message').textContent)")
     page.click("document.getElementById('tab-task')")
-    assert page.evaluate(WORDS)[0] == ["done", "open"]
+    assert page.evaluate(WORDS)[0] == ["done", "to do"]
     assert page.evaluate("document.querySelector('.goals .met .sign').textContent") == "✓"
     assert (
         page.evaluate("document.querySelector('#panel-task .facts').textContent")
@@ -103,12 +103,12 @@ def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
     page.open(lab.url)  # loaded anew it stays at the panel that was open, and shows what was done
     page.until("globalThis.dhkit?.lab?.state.task && dhkit.lab.state.own !== undefined")
     assert page.evaluate("document.getElementById('panel-motion').hidden") is False
-    assert page.evaluate(WORDS)[0] == ["done", "open"]
+    assert page.evaluate(WORDS)[0] == ["done", "to do"]
     page.click("document.getElementById('tab-task')")
     page.click(
         "[...document.querySelectorAll('#panel-task button')].find(b => b.textContent === 'Reset')"
     )
-    page.until(f"({WORDS})[0][0] === 'open'")
+    page.until(f"({WORDS})[0][0] === 'to do'")
     assert met(lab) == [False] * 11
 
 

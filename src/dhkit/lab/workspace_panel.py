@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -25,6 +26,8 @@ HALF_THICKNESS = 0.02
 """Half the thickness of a slice, as a share of the arm's reach."""
 SAME_PLACE = 1e-9
 """Distances below this, m, count as none."""
+SCALE_COLORS = 6
+"""Colors of the scale beside a cloud, from which the page interpolates."""
 WRIST_FRAME = 5
 """Frame whose origin is the wrist's centre of an arm with six joints, in both conventions."""
 
@@ -51,10 +54,16 @@ class WorkspacePanel(Panel):
         tool = self.desk.arm.fk(self.desk.q)[:3, 3]
         self._publish(kind=kind, count=0, progress="sampling")
 
-        def take(cloud: tuple[Array, Array, str]) -> None:
-            positions, colors, about = cloud
-            self.desk.view.points(positions, colors)
-            self._publish(kind=kind, count=len(positions), progress=None, about=about)
+        def take(cloud: _Cloud) -> None:
+            positions = cloud.positions
+            self.desk.view.points(positions, heat_colors(cloud.manipulability))
+            self._publish(
+                kind=kind,
+                count=len(positions),
+                progress=None,
+                about=cloud.about,
+                heat=_heat_scale(cloud.manipulability),
+            )
 
         self.jobs.start(
             "workspace", lambda job: _sample(arm, tool if kind == "slice" else None, job), take
@@ -152,8 +161,29 @@ def _distance_from_line(point: Array, line: Array) -> float:
     return float(np.nanmin(distances)) if np.isfinite(distances).any() else np.inf
 
 
-def _sample(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, str]:
-    """Return positions, shape (N, 3), m, colors, shape (N, 3), and a remark: of points that the tool reaches.
+@dataclass(frozen=True, eq=False)
+class _Cloud:
+    """Points that the tool reaches."""
+
+    positions: Array
+    """Shape (N, 3), m, world."""
+    manipulability: Array
+    """Shape (N,)."""
+    about: str
+    """What was assumed, for a person; it may be empty."""
+
+
+def _heat_scale(manipulability: Array) -> JsonObject:
+    """Return the largest value and the colors from 0 to it, as CSS, for the scale of a cloud."""
+    colors = heat_colors(np.linspace(0.0, 1.0, SCALE_COLORS))
+    return {
+        "largest": float(np.nan_to_num(manipulability).max(initial=0.0)),
+        "colors": [f"rgb({r:.0f} {g:.0f} {b:.0f})" for r, g, b in 255.0 * colors],
+    }
+
+
+def _sample(arm: Arm, through: Array | None, job: Job) -> _Cloud:
+    """Return points that the tool reaches.
 
     With ``through``, shape (3,), m, only points in the plane of axis 1 and that point are returned.
     """
@@ -175,7 +205,5 @@ def _sample(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, st
         chosen = np.flatnonzero(np.abs(offset) < HALF_THICKNESS * max(arm.description.reach, 1e-9))[
             :MAX_POINTS
         ]
-    about = "brighter: the tool moves more easily there"
-    if space.assumed:
-        about += "; assumed: " + ", ".join(space.assumed)
-    return space.positions[chosen], heat_colors(space.manipulability[chosen]), about
+    about = "assumed: " + ", ".join(space.assumed) if space.assumed else ""
+    return _Cloud(space.positions[chosen], space.manipulability[chosen], about)

@@ -99,8 +99,10 @@ _OFFLINE_MODULES = (
 _IMPORT = re.compile(r'(\bfrom |\bimport\()"(\.\.?/[^"]+)"')
 _UNQUOTED = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
 """Characters that a ``data:`` address has unquoted: base64 would be a quarter longer."""
-_REMOVED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
-"""Indentation, empty lines and whole-line comments, which offline modules lack; no string has several lines."""
+_INDENTATION = re.compile(r"^[ \t]+", re.MULTILINE)
+_REMOVED = re.compile(r"""^[ \t]*(?://.*)?\n?|[ \t]+// [^"'`\n]*$""", re.MULTILINE)
+"""Indentation, empty lines and comments, which offline modules lack; no string has several lines, and what looks like a
+comment in a string is followed by a quotation mark."""
 _CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 SECURITY_POLICY = (
@@ -193,7 +195,7 @@ def offline_page(
         {
             "<!-- policy -->": f'<meta http-equiv="Content-Security-Policy" content="{_OFFLINE_POLICY}">',
             "<title>dhkit</title>": f"<title>{html.escape(title)}</title>",
-            '<link rel="stylesheet" href="viewer.css">': f"<style>\n{style}</style>",
+            '<link rel="stylesheet" href="viewer.css">': f"<style>\n{_INDENTATION.sub('', style)}</style>",
             '<script src="meshcat.js"></script>': _script(meshcat_bundle().decode()),
             '<script type="module" src="main.js"></script>': _modules(modules),
             "<!-- messages -->": _script(_json(data), ' type="application/json" id="messages"')

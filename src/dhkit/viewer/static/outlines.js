@@ -3,6 +3,7 @@
 import { bareCopy } from "./overlays.js";
 
 const WIDTH = 3; // px
+const STENCIL_ORDER = 0.5; // after the arm and before the outlines
 const ROD = 0.004,
   END = 0.009; // radii of the gap's rod and ends, share of the arm's size
 
@@ -10,9 +11,18 @@ export class Outlines {
   constructor(scene, THREE) {
     this.THREE = THREE;
     this.group = new THREE.Group();
-    this.links = []; // of each outlined link: {node, copy, name}
+    this.links = []; // of each outlined link: {node, copy, stencil}
     this.size = { value: new THREE.Vector2(1, 1) }; // px
     this.materials = new Map();
+    this.stencil = new THREE.MeshBasicMaterial({
+      colorWrite: false,
+      depthWrite: false,
+      depthTest: false,
+      side: THREE.DoubleSide,
+      stencilWrite: true,
+      stencilRef: 1,
+      stencilZPass: THREE.ReplaceStencilOp,
+    });
     this.gap = this.rod();
     scene.add(this.group, this.gap);
   }
@@ -25,16 +35,26 @@ export class Outlines {
   set(colors, nodes) {
     this.group.clear();
     this.links = colors.flatMap((name, node) =>
-      name ? [{ node, copy: bareCopy(nodes[node], this.material(name), this.THREE) }] : [],
+      name ? [this.outline(nodes[node], node, name)] : [],
     );
-    for (const { copy } of this.links) this.group.add(copy);
+    for (const { copy, stencil } of this.links) this.group.add(stencil, copy);
     this.place(nodes);
   }
 
+  // The link itself, which only marks where it is on screen, and its outline, which is drawn where it is not.
+  outline(object, node, name) {
+    const copy = bareCopy(object, this.material(name), this.THREE);
+    const stencil = bareCopy(object, this.stencil, this.THREE);
+    stencil.traverse((part) => (part.renderOrder = STENCIL_ORDER));
+    return { node, copy, stencil };
+  }
+
   place(nodes) {
-    for (const { node, copy } of this.links) {
-      copy.position.copy(nodes[node].position);
-      copy.quaternion.copy(nodes[node].quaternion);
+    for (const { node, copy, stencil } of this.links) {
+      for (const object of [copy, stencil]) {
+        object.position.copy(nodes[node].position);
+        object.quaternion.copy(nodes[node].quaternion);
+      }
     }
   }
 
@@ -62,13 +82,18 @@ export class Outlines {
     const style = getComputedStyle(document.documentElement);
     for (const [name, material] of this.materials)
       material.color.set(style.getPropertyValue(name).trim());
-    this.gapMaterial.color.set(style.getPropertyValue("--contact").trim());
+    this.gapMaterial.color.set(style.getPropertyValue("--wrong").trim());
   }
 
   // The back sides of a surface that is moved outwards: what is left of it around the surface is the outline.
   material(name) {
     if (this.materials.has(name)) return this.materials.get(name);
-    const material = new this.THREE.MeshBasicMaterial({ side: this.THREE.BackSide });
+    const material = new this.THREE.MeshBasicMaterial({
+      side: this.THREE.BackSide,
+      stencilWrite: true,
+      stencilRef: 1,
+      stencilFunc: this.THREE.NotEqualStencilFunc,
+    });
     material.onBeforeCompile = (shader) => {
       shader.uniforms.size = this.size;
       shader.vertexShader = `uniform vec2 size;\n${shader.vertexShader}`.replace(

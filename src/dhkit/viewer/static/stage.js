@@ -493,9 +493,7 @@ export class Stage {
       this.warned = key;
       const outlined = this.nodes
         .slice(0, -1)
-        .map((_, i) =>
-          links.includes(i) ? "--contact" : joints.includes(i - 1) ? "--accent" : null,
-        );
+        .map((_, i) => (links.includes(i) || joints.includes(i - 1) ? "--wrong" : null));
       this.outlines.set(outlined, this.nodes);
     }
     const points = contact?.points;

@@ -10,8 +10,8 @@ const FRICTIONS = [
 ];
 const REFERENCES = [
   ["hold", "holds where it is"],
-  ["sine", "a sine of every joint"],
-  ["motion", "the planned motion, to and fro"],
+  ["sine", "sines, all joints"],
+  ["motion", "the motion, to and fro"],
   ["target", "the tool's target"],
   ["sliders", "the joint sliders"],
 ];
@@ -141,7 +141,7 @@ export class ControlPanel {
           this.force.map((input, k) => h("label", {}, h("span", {}, `${"xyz"[k]} [N]`), input)),
         ),
       ),
-      h("div", { class: "buttons" }, download("csv"), download("npz")),
+      h("div", { class: "buttons" }, "Save:", download("csv"), download("npz")),
     );
     this.rows = [];
     this.columns = [];
@@ -188,10 +188,8 @@ export class ControlPanel {
     this.pause.textContent = state.paused ? "Go on" : "Pause";
     this.pause.disabled = this.pushing.disabled = !state.running;
     this.planar.setAttribute("aria-pressed", String(state.planar));
-    const slow =
-      state.running && state.speed < 0.95 ? `${fixed(state.speed, 2)} of real time` : null;
     const time = state.running ? `${fixed(state.time, 1)} s` : null;
-    const words = [state.error, time, slow, state.note].filter(Boolean);
+    const words = [state.error, time, state.note].filter(Boolean);
     if (this.arm?.bodies) this.note.textContent = words.join("; ");
     this.note.classList.toggle("bad", Boolean(state.error));
   }
@@ -281,16 +279,8 @@ class GainTable {
           h(
             "tr",
             {},
-            ["joint", "Kp", "Ki", "Kd", "pole"].map((name) =>
-              h(
-                "th",
-                {
-                  scope: "col",
-                  title: name === "pole" ? "Real part of the slowest pole, 1/s" : name,
-                },
-                name,
-              ),
-            ),
+            ["joint", "Kp", "Ki", "Kd"].map((name) => h("th", { scope: "col" }, name)),
+            h("th", { scope: "col", title: "Real part of the slowest pole, 1/s" }, "pole [1/s]"),
           ),
         ),
         this.body,
@@ -310,7 +300,7 @@ class GainTable {
         if (document.activeElement !== input)
           input.value = String(Number(gains[name][i].toPrecision(4)));
       const real = gains.slowest[i];
-      pole.textContent = `${fixed(real, Math.abs(real) < 1 ? 3 : 1)} 1/s`;
+      pole.textContent = fixed(real, Math.abs(real) < 1 ? 3 : 1);
       pole.classList.toggle("bad", real >= 0);
     });
   }

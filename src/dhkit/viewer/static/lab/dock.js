@@ -4,7 +4,7 @@ import { h } from "./dom.js";
 import { draggedEdge } from "./edge.js";
 import { remember, remembered } from "./memory.js";
 
-const USUAL = 236,
+const USUAL = innerHeight < 900 ? 236 : 280,
   LEAST = 150; // px
 const SCENE = 200; // px that are left to the scene
 

@@ -24,9 +24,10 @@ export class DynamicsPanel extends FollowingPanel {
             on: this.ellipsoid.getAttribute("aria-pressed") !== "true",
           }),
       },
-      "Ellipsoid of velocities",
+      "Velocity ellipsoid",
     );
-    this.facts = h("p", { class: "facts" });
+    this.facts = [h("td"), h("td"), h("td")];
+    this.factNames = this.facts.map(() => h("th", { scope: "row" }));
     this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
     root.append(
       this.note,
@@ -38,7 +39,15 @@ export class DynamicsPanel extends FollowingPanel {
       this.entry,
       h("h2", {}, "Manipulability"),
       h("div", { class: "buttons" }, this.ellipsoid),
-      this.facts,
+      h(
+        "table",
+        { class: "facts" },
+        h(
+          "tbody",
+          {},
+          this.facts.map((value, k) => h("tr", {}, this.factNames[k], value)),
+        ),
+      ),
     );
   }
 
@@ -93,24 +102,40 @@ export class DynamicsPanel extends FollowingPanel {
     const tau = this.torques?.tau ?? g ?? [],
       largest = Math.max(1e-9, ...tau.map(Math.abs));
     this.heading.textContent = this.torques?.title ?? "Gravity torques";
-    this.rows.forEach(({ bar, value }, i) => {
+    this.rows.forEach(({ bar, mark, value }, i) => {
       const limit = effort[i],
-        share = Math.min(1, Math.abs(tau[i]) / (limit ?? largest)),
+        share = Math.min(1, Math.abs(tau[i]) / largest),
         unit = joints[i].unit === "m" ? "N" : "N m";
       bar.style.width = `${50 * share}%`;
       bar.style.left = tau[i] < 0 ? `${50 - 50 * share}%` : "50%";
       bar.classList.toggle("over", limit !== null && Math.abs(tau[i]) > limit);
-      value.textContent = `${fixed(tau[i], 2)} ${unit}${limit === null ? "" : ` (${fixed((100 * Math.abs(tau[i])) / limit, 0)} %)`}`;
+      value.textContent = `${fixed(tau[i], 2)} ${unit}`;
+      // The limit is a mark where the scale of the bars, the largest torque, reaches it.
+      const place = limit === null ? Infinity : limit / largest;
+      mark.hidden = place > 1;
+      mark.style.left = `${50 + 50 * place * Math.sign(tau[i])}%`;
+      value.title =
+        limit === null ? "" : `${fixed((100 * Math.abs(tau[i])) / limit, 0)} % of the limit`;
     });
     if (M)
       this.cells.forEach((row, i) =>
-        row.forEach((cell, j) => (cell.textContent = fixed(M[i][j], 4))),
+        row.forEach((cell, j) => {
+          const text = fixed(M[i][j], 4);
+          cell.textContent = text;
+          cell.classList.toggle("small", Number(text) === 0);
+        }),
       );
     const axes = lengths
       .filter((x) => x !== null)
       .map((x) => fixed(x, 3))
       .join(", ");
-    this.facts.textContent = `half axes ${axes} m/s for joint rates of norm 1; manipulability ${manipulability.toPrecision(3)}; condition number ${condition === null ? "infinite: singular" : condition.toPrecision(3)}`;
+    const facts = [
+      ["half axes [m/s], joint rates of norm 1", axes],
+      ["manipulability", manipulability.toPrecision(3)],
+      ["condition number", condition === null ? "infinite: singular" : condition.toPrecision(3)],
+    ];
+    facts.forEach(([, text], k) => (this.facts[k].textContent = text));
+    this.factNames.forEach((name, k) => (name.textContent = facts[k][0]));
   }
 
   build(bodies) {
@@ -120,10 +145,10 @@ export class DynamicsPanel extends FollowingPanel {
     const slides = arm.joints.map((joint) => joint.unit === "m");
     this.inertia.textContent = `Mass matrix [${slides.every(Boolean) ? "kg" : slides.some(Boolean) ? "kg m², kg m, kg" : "kg m²"}]`;
     this.rows = bodies
-      ? arm.joints.map(() => ({ bar: h("i"), value: h("span", { class: "value" }) }))
+      ? arm.joints.map(() => ({ bar: h("i"), mark: h("b"), value: h("span", { class: "value" }) }))
       : [];
     this.bars.replaceChildren(
-      ...this.rows.map(({ bar, value }, i) =>
+      ...this.rows.map(({ bar, mark, value }, i) =>
         h(
           "div",
           { class: "bar" },
@@ -137,7 +162,7 @@ export class DynamicsPanel extends FollowingPanel {
             },
             arm.joints[i].name,
           ),
-          h("span", { class: "track" }, bar),
+          h("span", { class: "track" }, bar, mark),
           value,
         ),
       ),

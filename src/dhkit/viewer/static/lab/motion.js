@@ -51,13 +51,13 @@ export class MotionPanel {
       inputmode: "decimal",
       class: "number",
       "aria-label": "Radius of the circle",
-      placeholder: "usual",
+      placeholder: "automatic",
     });
     this.centre = h("input", {
       type: "text",
       class: "centre",
       "aria-label": "Centre of the circle, three numbers",
-      placeholder: "towards the base",
+      placeholder: "automatic",
     });
     this.circle = h(
       "div",
@@ -101,10 +101,11 @@ export class MotionPanel {
       "div",
       { class: "buttons", hidden: true },
       this.replay,
+      h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
+      h("span", {}, "Save:"),
       download("csv"),
       download("npz"),
       this.video,
-      h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
     );
     root.append(
       h("div", { class: "line" }, this.kind, h("label", { class: "goal" }, "to ", this.goal)),

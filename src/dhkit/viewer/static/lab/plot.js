@@ -5,6 +5,7 @@ import { h, save } from "./dom.js";
 
 const LEAST = { width: 200, height: 96 }; // px
 const SYNC = "dhkit"; // one pointer in all plots
+const NEAR = 0.25; // share of the range of a joint
 const DIGITS = 8; // of numbers in a CSV
 
 let loading = null;
@@ -120,7 +121,7 @@ export class Plot {
         scales: { x: { time: false } },
         series: [{ label: "t [s]" }, ...series],
         axes: [
-          { ...axis, size: 26 },
+          { ...axis, size: 24, label: "t [s]", labelSize: 15, labelGap: 0, labelFont: axis.font },
           { ...axis, size: 46, space: 22 },
         ],
         legend: { show: false },
@@ -175,10 +176,14 @@ export class Plot {
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.setLineDash([2, 4]);
+    let drawn = false;
     this.limits.forEach((pair, k) => {
       if (this.hidden.has(k)) return;
       for (const value of pair ?? []) {
         if (value === null || value < plot.scales.y.min || value > plot.scales.y.max) continue;
+        // A limit far from its own curve would look like that of another.
+        if (!this.comesNear(k, value, pair)) continue;
+        drawn = true;
         const y = Math.round(plot.valToPos(value, "y", true)) + 0.5;
         ctx.strokeStyle = CURVES[k % CURVES.length];
         ctx.beginPath();
@@ -188,6 +193,13 @@ export class Plot {
       }
     });
     ctx.restore();
+    this.caption.classList.toggle("limited", drawn);
+  }
+
+  // Whether a curve comes within a quarter of the range between its limits of one of them.
+  comesNear(k, limit, [low, high]) {
+    const range = low === null || high === null ? Math.abs(limit) : high - low;
+    return this.shownData[k + 1].some((value) => Math.abs(value - limit) < NEAR * range);
   }
 
   // Mark a time by the line that a pointer has.

@@ -63,25 +63,31 @@ export class SubmitPanel {
   take_verdict(verdict) {
     this.cancel.hidden = !verdict?.running;
     this.send.disabled = Boolean(verdict?.running);
-    this.note.textContent = !verdict
-      ? ""
-      : verdict.running
-        ? "judging …"
-        : (verdict.error ??
-          `${verdict.verdict}${verdict.missing.length ? `; missing: ${verdict.missing.slice(0, 6).join(", ")}${verdict.missing.length > 6 ? ` and ${verdict.missing.length - 6} more` : ""}` : ""}`);
-    this.note.classList.toggle(
-      "bad",
-      Boolean(verdict && !verdict.running && (verdict.error || verdict.verdict !== "correct")),
-    );
+    this.note.textContent = !verdict ? "" : verdict.running ? "judging …" : (verdict.error ?? "");
+    this.note.classList.toggle("bad", Boolean(verdict?.error));
     if (!verdict || verdict.running || verdict.error) return this.report.replaceChildren();
     const found = verdict.diagnosis.map(({ place, sentence }) =>
       h("p", { class: "diagnosis" }, h("b", {}, `${place}: `), sentence),
     );
     const notes = verdict.notes.map((text) => h("p", { class: "hint" }, text));
+    const right = verdict.entries.filter((entry) => entry.passes).length;
+    const all = verdict.entries.length;
+    const count = all ? `${right} of ${all} right` : verdict.verdict;
     this.report.replaceChildren(
+      h("p", { class: right < all || !all ? "verdict bad" : "verdict" }, count),
       ...found,
       ...verdict.entries.map((entry) => this.entry(entry)),
       ...notes,
+      ...(verdict.missing.length
+        ? [
+            h(
+              "details",
+              { class: "hint" },
+              h("summary", {}, `${verdict.missing.length} entries without an answer`),
+              verdict.missing.join(", "),
+            ),
+          ]
+        : []),
     );
   }
 
@@ -96,7 +102,7 @@ export class SubmitPanel {
       shown(read, text),
       statement ? h("small", {}, statement) : null,
       difference_text
-        ? [h("small", {}, "answer less the truth"), shown(difference, difference_text)]
+        ? [h("small", {}, "your answer minus the correct one"), shown(difference, difference_text)]
         : null,
       witness ? h("small", {}, witness) : null,
     );

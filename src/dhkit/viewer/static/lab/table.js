@@ -230,8 +230,9 @@ export class TablePanel {
           text !== this.shownText(i, column) &&
           this.lab.ask("table.edit", { row: i, column, text: this.sentText(text, column) }),
       );
-      const name = h("small", { title: row.joint }, row.joint);
-      const sign = variable ? h("span", { class: "variable" }, name, `q${i + 1} +`) : null;
+      const sign = variable
+        ? h("span", { class: "variable", title: row.joint }, `q${i + 1} +`)
+        : null;
       return h("td", {}, sign, input);
     });
     return h(

@@ -179,7 +179,7 @@ export class TaskPanel {
       if (met && mark.met === false && this.root.hidden) this.lab.tell(`Done: ${text}`);
       mark.met = met;
       mark.sign.textContent = met ? "✓" : "○";
-      mark.word.textContent = met ? "done" : "open";
+      mark.word.textContent = met ? "done" : "to do";
       mark.root.classList.toggle("met", met);
     });
     count.textContent = goals.length

@@ -187,8 +187,8 @@ export class TransformsPanel {
             "by",
             amount,
             choose(step, "about", `axes of step ${k + 1}`, [
-              ["current", "current"],
-              ["fixed", "fixed"],
+              ["current", "current axes"],
+              ["fixed", "fixed axes"],
             ]),
             h(
               "button",
@@ -257,30 +257,26 @@ export class TransformsPanel {
   }
 
   table(vertices) {
-    const before = this.solid.vertices.slice(0, vertices.length),
-      text = (point) => point.map((x) => fixed(x, 4)).join("  ");
+    const before = this.solid.vertices.slice(0, vertices.length);
+    const cells = (point) => point.map((x) => h("td", {}, fixed(x, 3)));
     const rows = vertices.map((point, k) =>
-      h(
-        "tr",
-        {},
-        h("th", { scope: "row" }, String(k + 1)),
-        h("td", {}, text(before[k])),
-        h("td", {}, text(point)),
-      ),
+      h("tr", {}, h("th", { scope: "row" }, String(k + 1)), cells(before[k]), cells(point)),
     );
     return h(
       "div",
       { class: "wide" },
       h(
         "table",
-        { class: "numbers" },
+        { class: "numbers points" },
         h(
           "thead",
           {},
           h(
             "tr",
             {},
-            ["vertex", "before [m]", "after [m]"].map((head) => h("th", { scope: "col" }, head)),
+            h("th", { scope: "col" }, "vertex"),
+            h("th", { scope: "colgroup", colSpan: 3 }, "before: x, y, z [m]"),
+            h("th", { scope: "colgroup", colSpan: 3 }, "after: x, y, z [m]"),
           ),
         ),
         h("tbody", {}, rows),

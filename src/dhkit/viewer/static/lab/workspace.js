@@ -26,28 +26,41 @@ export class WorkspacePanel extends FollowingPanel {
       "Draw again",
     );
     this.note = h("p", { class: "note", role: "status" });
+    this.heat = h("div", { class: "heat", hidden: true });
     this.distance = h("p", { class: "distance" });
     this.hint = h(
       "p",
       { class: "hint" },
-      "Joint limits count for the points; for the boundary, those of slides alone.",
+      "The boundary leaves the limits of revolute joints out; the points keep all limits.",
     );
     root.append(
       h("label", { class: "line" }, "Show ", this.kind),
       h("div", { class: "buttons" }, this.again),
       this.note,
+      this.heat,
       h("h2", {}, "Distance from the boundary"),
       this.distance,
       this.hint,
     );
   }
 
-  take_workspace({ kind, count, progress, about, error }) {
+  take_workspace({ kind, count, progress, about, heat, error }) {
+    this.heat.hidden = !heat || progress !== null || kind === "none";
+    if (heat)
+      this.heat.replaceChildren(
+        "manipulability 0",
+        h("i", { style: `background:linear-gradient(to right, ${heat.colors.join(", ")})` }),
+        heat.largest.toPrecision(3),
+      );
     this.kind.value = kind;
     this.again.hidden = kind !== "slice";
     this.note.textContent =
       error ??
-      (progress ? `sampling … ${progress}` : kind === "none" ? "" : `${count} points; ${about}`);
+      (progress
+        ? `sampling … ${progress}`
+        : kind === "none"
+          ? ""
+          : [`${count} points`, about].filter(Boolean).join("; "));
   }
 
   show({ distance, boundary, point }) {
