@@ -47,6 +47,7 @@ from .errors import (
     DescriptionError as DescriptionError,
     DhkitError as DhkitError,
     ExpressionError as ExpressionError,
+    MissingPackageError as MissingPackageError,
     ModelError as ModelError,
     PlanningError as PlanningError,
     SimulationError as SimulationError,

@@ -29,6 +29,10 @@ class ModelError(DhkitError):
     """A URDF, a mesh or a Pinocchio model that cannot be read or built."""
 
 
+class MissingPackageError(DhkitError):
+    """A package that is needed, and that this installation lacks; the message says how to install it."""
+
+
 class PlanningError(DhkitError):
     """A trajectory that is infeasible or did not converge: names the constraint."""
 

@@ -57,6 +57,8 @@ COMMANDS = {
     "bench": "bench",
     "schema": "files",
     "demo": "demo",
+    "doctor": "doctor",
+    "cache": "doctor",
 }
 """Modules of the commands, in the order of the help; they are imported when a command runs, since that takes long."""
 

@@ -24,7 +24,7 @@ from dhkit.cli.straight import Branches, Line, branches, straight_line
 from dhkit.control import compare
 from dhkit.description import Array, write_atomically
 from dhkit.dynamics import dynamics_graph
-from dhkit.errors import DhkitError
+from dhkit.errors import DhkitError, MissingPackageError
 from dhkit.symbolic import operation_count
 from dhkit.symbolic.equations import equations_latex, latex_document, readable
 from dhkit.trajectories import Trajectory
@@ -74,7 +74,10 @@ def demo(
 
     def stage(title: str, work: Callable[[], str]) -> None:
         start = time.perf_counter()
-        result = work()
+        try:
+            result = work()
+        except MissingPackageError as error:
+            result = f"skipped: {error}"
         seconds = time.perf_counter() - start
         stages.append({"stage": title, "result": result, "seconds": seconds})
         if not json:
@@ -96,14 +99,17 @@ def demo(
     stage("ik", lambda: _inverse(arm, folder, shown))
     stage("plan", lambda: _plan(arm, folder, 16 if quick else None, motions))
     stage("control", lambda: _control(arm, folder, motions))
-    stage("page", lambda: _page(arm, shown[0], folder / "index.html", motions))
+    page = folder / "index.html"
+    if shown:
+        stage("page", lambda: _page(arm, shown[0], page, motions))
     ok = all(report.ok for report in reports)
     if json:
         print_json({"robot": arm.name, "folder": str(folder), "ok": ok, "stages": stages})
     else:
         for report in reports:
             say(f"\n{report}")
-        say(f"\nOpen {folder / 'index.html'} in a browser; it needs no network.")
+        if page.exists():
+            say(f"\nOpen {page} in a browser; it needs no network.")
     return ExitStatus.FINE if ok else ExitStatus.NO
 
 

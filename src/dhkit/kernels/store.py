@@ -30,6 +30,7 @@ PACKAGES = (
     "symbolic",
 )
 """Packages of dhkit whose sources determine the results of a kernel."""
+_SUFFIX = ".kernel"
 _VERSIONS = ("casadi", "llvmlite", "numpy")
 """Packages whose versions determine programs and machine code."""
 
@@ -179,8 +180,31 @@ def write(name: str, key: str, code: bytes) -> None:
         _warn_once(f"kernels are not cached: {folder}: {error.strerror}")
 
 
+def stored_kernels() -> list[Path]:
+    """Return the files of all kernels in the cache, those of other versions and processors too."""
+    folder = cache_folder()
+    return [] if folder is None else sorted(folder.glob(f"*{_SUFFIX}"))
+
+
+def clear() -> int:
+    """Delete the kernels in the cache, and return how many there were; they are compiled again when needed.
+
+    Raises
+    ------
+    DhkitError
+        A file cannot be deleted.
+    """
+    files = stored_kernels()
+    for path in files:
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise DhkitError(f"{path}: {error.strerror}") from None
+    return len(files)
+
+
 def _path(folder: Path, name: str, key: str) -> Path:
-    return folder / f"{name}_{key}.kernel"
+    return folder / f"{name}_{key}{_SUFFIX}"
 
 
 def _seal(code: bytes) -> bytes:

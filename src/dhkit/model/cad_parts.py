@@ -19,6 +19,7 @@ from dhkit.model.collada import collada_unit
 from dhkit.model.mat_parts import mat_parts
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.triangle_mesh import TriangleMesh
+from dhkit.packages import imported
 
 _MIN_TRIANGLES = 4
 """Smallest number of triangles that a part may be simplified to."""
@@ -135,17 +136,16 @@ def simplified(mesh: TriangleMesh, count: int, name: str) -> TriangleMesh:
 
     Raises
     ------
+    MissingPackageError
+        fast-simplification is not installed.
     ModelError
-        fast-simplification is not installed, or leaves nothing.
+        It leaves nothing.
     """
     if len(mesh.faces) <= count:
         return mesh
-    try:
-        import fast_simplification
-    except ImportError as error:
-        raise ModelError(
-            f"simplifying needs fast-simplification ({error}); pip install fast-simplification"
-        ) from None
+    fast_simplification = imported(
+        "fast_simplification", "simplifying a mesh", "pip install fast-simplification"
+    )
     started = time.perf_counter()
     log.info("simplifying %s: %d triangles to %d ...", name, len(mesh.faces), count)
     # Relative to the mesh's size: collapses are ordered by distances in single precision.

@@ -25,6 +25,7 @@ from dhkit.model.polygons import triangles_of
 from dhkit.model.shapes import Part
 from dhkit.model.stl import ascii_corners, binary_corners, coordinates
 from dhkit.model.triangle_mesh import TriangleMesh
+from dhkit.packages import imported
 
 _OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
 _OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
@@ -196,8 +197,7 @@ def _obj_polygons(content: bytes, count: int) -> list[list[int]]:
 
 def _ply_mesh(content: bytes, count: int) -> TriangleMesh:
     """Return a PLY file's triangles, at least ``count`` of them."""
-    import trimesh
-
+    trimesh = imported("trimesh", "reading a PLY file")
     try:
         # From memory and without a resolver, so that no texture file is opened.
         mesh = trimesh.load_scene(io.BytesIO(content), file_type="ply", process=False).to_mesh()

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.packages import imported
 
 _CONCAVE_SINE = 1e-9
 """A corner is concave if its turn, relative to the squared length of the longest edge, is below minus this number."""
@@ -71,7 +72,7 @@ def _is_concave(points: Array) -> NDArray[np.bool_]:
 
 def _triangulate(points: Array) -> NDArray[np.intp]:
     """Return a polygon's triangles by the indices of its corners, in the polygon's own orientation."""
-    from manifold3d import triangulate
+    triangulate = imported("manifold3d", "reading concave faces").triangulate
 
     normal = _normals(points[None])[0]
     normal = normal / np.linalg.norm(normal)

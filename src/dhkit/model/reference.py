@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from dhkit.description import Description, takes_robot
-from dhkit.errors import ModelError
+from dhkit.errors import MissingPackageError, ModelError
 from dhkit.model.urdf import mechanics_urdf_text
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ else:
     PinocchioModel: TypeAlias = Any
 
 
-class NoPinocchioError(ModelError):
+class NoPinocchioError(MissingPackageError, ModelError):
     """Pinocchio is not installed; there is no wheel of it for Windows."""
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 from dhkit.model.bounds import BOUNDS
 from dhkit.model.triangle_mesh import TriangleMesh, area_vectors, component_labels, unit_normals
+from dhkit.packages import imported
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -151,13 +152,13 @@ class Shells:
 
     def _solid(self, k: int) -> Manifold | None:
         """Return a shell, or a cavity's inside, as a solid; None if an edge belongs to more than two triangles."""
-        from manifold3d import Error, Manifold, Mesh64
-
+        manifold3d = imported("manifold3d", "the mass of nested surfaces")
         used, faces = np.unique(self._faces(k), return_inverse=True)
         faces = faces.reshape(-1, 3)[:, :: 1 if self.volume[k] > 0 else -1]
         points = np.ascontiguousarray(self.mesh.vertices[used])
-        solid = Manifold(Mesh64(points, np.ascontiguousarray(faces, dtype=np.uint64)))
-        return solid if solid.status() == Error.NoError else None
+        mesh = manifold3d.Mesh64(points, np.ascontiguousarray(faces, dtype=np.uint64))
+        solid: Manifold = manifold3d.Manifold(mesh)
+        return solid if solid.status() == manifold3d.Error.NoError else None
 
     def _windings(self, k: int) -> Array:
         """Return the winding numbers of the other shells at a shell's test points, shape (p,)."""
@@ -194,9 +195,7 @@ def _common_volume(
     solid: Manifold | None, around: list[tuple[Manifold | None, bool]]
 ) -> float | None:
     """Return the volume of a solid inside the material of larger shells, from which cavities are subtracted."""
-    from manifold3d import Manifold
-
-    material = Manifold()
+    material = imported("manifold3d", "the mass of nested surfaces").Manifold()
     for other, is_material in around:
         if other is None or solid is None:
             return None

@@ -12,6 +12,7 @@ from dhkit.description import Array, Box, Capsule, Cylinder, Mesh, Sphere
 from dhkit.errors import ModelError
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.stl import binary_stl
+from dhkit.packages import imported
 from dhkit.viewer.overlays import AXIS_COLORS, rgb_bytes
 
 if TYPE_CHECKING:
@@ -148,8 +149,7 @@ def _meshcat() -> Any:
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", category=DeprecationWarning, message="zmq")
-        from meshcat import geometry
-    return geometry
+        return imported("meshcat.geometry", "the viewer")
 
 
 def _lowered(kind: str, geometry: Any, material: Any, name: str) -> Lowered:

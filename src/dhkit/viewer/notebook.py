@@ -13,6 +13,8 @@ from importlib import resources
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from dhkit.packages import imported
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -66,9 +68,9 @@ def new_figure(**options: Any) -> Figure:
 @cache
 def _figure_class() -> type[Figure]:
     """Return the class of figures; matplotlib is imported here, since that takes 0.3 s."""
-    from matplotlib.figure import Figure
+    base: type[Figure] = imported("matplotlib.figure", "a figure").Figure
 
-    class NotebookFigure(Figure):
+    class NotebookFigure(base):  # type: ignore[valid-type, misc]
         def _repr_png_(self) -> bytes:
             picture = io.BytesIO()
             self.savefig(picture, format="png", dpi=_RESOLUTION)

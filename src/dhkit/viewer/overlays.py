@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array
+from dhkit.packages import imported
 
 if TYPE_CHECKING:
     from dhkit.kinematics.manipulability import Ellipsoid
@@ -72,8 +73,7 @@ def heat_colors(values: ArrayLike) -> Array:
     >>> heat_colors([0.0, 1.0, 2.0]).shape
     (3, 3)
     """
-    import matplotlib
-
+    matplotlib = imported("matplotlib", "a scale of colors")
     known = np.nan_to_num(np.asarray(values, dtype=float))
     share = _HEAT_END * known / (float(known.max(initial=0.0)) or 1.0)
     return np.asarray(matplotlib.colormaps[_HEAT_COLORMAP](share))[..., :3]

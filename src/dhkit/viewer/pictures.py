@@ -18,6 +18,7 @@ from dhkit.description.frames import joint_array
 from dhkit.errors import ModelError
 from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import Part, link_parts
+from dhkit.packages import imported
 from dhkit.viewer.drawables import grid_step
 from dhkit.viewer.overlays import AXIS_COLORS
 from dhkit.viewer.scene import (
@@ -205,7 +206,7 @@ def _solids(description: Description) -> tuple[_Solid, ...]:
 
 def _triangles(part: Part) -> Array:
     """Return a part's triangles in its link's frame, shape (m, 3, 3), m."""
-    import trimesh
+    trimesh = imported("trimesh", "a picture")
 
     shape = part.geometry
     match shape:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dhkit.control import Comparison, SimulationResult
 from dhkit.description import Array, Description
+from dhkit.packages import imported
 from dhkit.viewer.diagrams import (
     LINE_STYLES,
     SHARED_COLOR,
@@ -112,7 +113,7 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
     ValueError
         There is no result, or the arms have different kinds of joints.
     """
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
+    layout_engine = imported("matplotlib.layout_engine", "a figure")
 
     if not results:
         raise ValueError("results is empty; expected simulations by their names")
@@ -122,7 +123,7 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
             raise ValueError(
                 f"{name} has joints {result.description.kinds}; expected {first.kinds}"
             )
-    layout = ConstrainedLayoutEngine(w_pad=_DIAGRAM_MARGIN)
+    layout = layout_engine.ConstrainedLayoutEngine(w_pad=_DIAGRAM_MARGIN)
     figure = new_figure(figsize=(11.5, max(3.8, 1.6 + 0.42 * len(results))), layout=layout)
     figure.suptitle(
         title or f"{first.name}: errors of {len(results)} controllers",
