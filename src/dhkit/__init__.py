@@ -4,7 +4,7 @@ from pkgutil import iter_modules
 
 from lazy_loader import attach_stub
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, _, _names = attach_stub(__name__, __file__)
 

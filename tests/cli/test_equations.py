@@ -185,3 +185,24 @@ def test_a_page_has_an_equation_for_each_entry_and_the_symbols_that_occur():
     symbols = re.findall(r"<td>(\w+)</td>", page)
     assert {"m1", "m2", "l1", "l2"} <= set(symbols)
     assert "qd1" not in equations_page(lag, readable(lag, "g"))
+
+
+def test_long_decimals_are_rounded_unless_all_are_asked_for(dhkit, tmp_path):
+    """Products of a CAD program's numbers have 70 digits."""
+    file = tmp_path / "arm.toml"
+    file.write_text(
+        'format = 1\nname = "cad"\n[[joint]]\ntype = "revolute"\na = 0.2512345678901\nalpha = 0\nd = 0\n'
+        "theta = 0\nbody = { mass = 1.3173724319540, com = [-0.0960719135381, 0, 0], "
+        "inertia = { xx = 0.0009098584633, yy = 0.0009406760040, zz = 0.0018250767915 } }\n"
+    )
+    status, text, _ = dhkit(str(file), "--what", "M")
+    assert status == 0
+    assert re.search(r"^M11 = 0\.\d{5,7}$", text, re.MULTILINE)
+    assert "--digits 0 prints them exactly" in text
+    _, exact, _ = dhkit(str(file), "--what", "M", "--digits", "0")
+    assert re.search(r"^M11 = 0\.\d{30,}$", exact, re.MULTILINE)
+    _, symbolic, _ = dhkit("planar2r", "--what", "M")
+    assert "significant digits" not in symbolic
+    status, _, complaint = dhkit("planar2r", "--format", "c", "--digits", "3")
+    assert status == 2
+    assert "leave it out" in complaint

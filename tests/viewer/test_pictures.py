@@ -8,6 +8,7 @@ from acceptance import different_robots_first
 from dhkit import Arm, robots
 from dhkit.control import PDGravity
 from dhkit.description import library_robot
+from dhkit.planning import Floor, Obstacle
 from dhkit.viewer import View
 from dhkit.viewer.picture_files import write_motion_gif, write_motion_pngs
 from dhkit.viewer.pictures import GROUND_COLOR, Ghost, _rasterize, picture, pictures
@@ -242,3 +243,20 @@ def test_many_large_triangles_behind_each_other_take_no_memory():
     tracemalloc.stop()
     assert peak < 1e9  # all at once would need 4e9
     assert (drawn[10, 10] == 200).all()  # the last is the nearest
+
+
+def test_obstacles_are_drawn_and_in_view():
+    arm = library_robot("planar2r")
+    ball = Obstacle.sphere(0.3, (0.0, -2.0, 0.0), name="ball")
+    alone = np.asarray(picture(arm, [0.3, 0.4]))
+    beside = np.asarray(picture(arm, [0.3, 0.4], obstacles=[ball, Floor()]))
+    # Violet, as in the viewer: more blue than green; nothing else in the picture is.
+    violet = beside[..., 2].astype(int) - beside[..., 1] > 12
+    assert not (alone[..., 2].astype(int) - alone[..., 1] > 12).any()
+    rows, columns = np.nonzero(violet)
+    # A ball looks nearly round, and the whole of it is in the picture.
+    height, width = np.ptp(rows), np.ptp(columns)
+    assert 0.9 < height / width < 1.1
+    assert rows.min() > 0 and rows.max() < beside.shape[0] - 1
+    assert columns.min() > 0 and columns.max() < beside.shape[1] - 1
+    assert violet.sum() == pytest.approx(np.pi / 4 * height * width, rel=0.05)

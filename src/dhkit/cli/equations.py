@@ -14,7 +14,7 @@ from dhkit.cli.options import Json, Robot, Uniform, load_arm
 from dhkit.cli.output import print_json, report_files
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
-from dhkit.errors import DescriptionError
+from dhkit.errors import DescriptionError, DhkitError
 from dhkit.symbolic import (
     Lagrangian,
     SymbolicKinematics,
@@ -37,6 +37,7 @@ from dhkit.symbolic.equations import (
     matlab_files,
     quantities,
     readable,
+    rounded,
 )
 
 MAX_TITLE_LENGTH = 200
@@ -46,6 +47,13 @@ Source: TypeAlias = Lagrangian | SymbolicKinematics
 INVERSE = "ik"
 """The quantity that stands for the derivation of inverse kinematics."""
 CODE = ("python", "c", "matlab")
+DEFAULT_DIGITS = 6
+"""Significant digits of equations whose numbers have more than a floating-point number."""
+FLOAT_DIGITS = 17
+LONG = 200
+"""Terms of equations that are long."""
+MUCH_SHORTER = 5
+"""Ratio of terms for which base parameters are recommended."""
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -107,6 +115,15 @@ def equations(
             help="Use the base parameters (the fewest inertial parameters), and print their definitions.",
         ),
     ] = False,
+    digits: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=17,
+            help="Significant digits of numbers in text, latex and html; 0 for all. Default: all, but 6 where a number "
+            "has more digits than a floating-point number.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -138,16 +155,65 @@ def equations(
         shown = kinematic_quantities(kinematics, what)
     else:
         lag = derived = _lagrangian_of(arm.description, symbols, base)
-        shown = (quantities if form in ("python", "c", "matlab") else readable)(derived, what)
+        shown = list((quantities if form in CODE else readable)(derived, what))
+    notes: list[str] = []
+    if form not in CODE:
+        shown, notes = _to_digits(shown, digits)
+        notes += _shorter_by_base_parameters(arm.description, shown, base, what)
+    elif digits is not None:
+        raise DescriptionError(f"--digits: {form} has all digits; leave it out")
     if output is not None:
         files = _write(lag, shown, form, output)
         report_files(files, json=json)
         return
     text = FORMATS[form](lag, shown)
+    if form == "text":
+        text += "".join(f"note: {note}\n" for note in notes)
     if json:
         print_json(_facts(lag, shown, form, text))
     else:
         sys.stdout.write(text)
+
+
+def _to_digits(shown: list[Quantity], digits: int | None) -> tuple[list[Quantity], list[str]]:
+    """Return quantities with numbers of so many digits, and a note that says so; None decides by their length."""
+    is_long = any(_is_long(quantity) for quantity in shown)
+    if digits is None:
+        digits = DEFAULT_DIGITS if is_long else 0
+    if not digits:
+        return shown, []
+    note = f"numbers are rounded to {digits} significant digits; --digits 0 prints them exactly"
+    return [rounded(quantity, digits) for quantity in shown], [note]
+
+
+def _is_long(quantity: Quantity) -> bool:
+    """Return whether a coefficient has more digits than a floating-point number."""
+    return any(
+        max(abs(coefficient.numerator), coefficient.denominator) > 10**FLOAT_DIGITS
+        for element in quantity.elements.flat
+        for coefficient in element.terms.values()
+    )
+
+
+def _shorter_by_base_parameters(
+    description: Description, shown: Sequence[Quantity], base: bool, what: str
+) -> list[str]:
+    """Return a note where base parameters make long equations much shorter."""
+    terms = _term_count(shown)
+    if base or terms < LONG:
+        return []
+    try:
+        shorter = readable(base_parameters(description).lagrangian, what)
+    except DhkitError:
+        return []
+    count = _term_count(shorter)
+    if terms < MUCH_SHORTER * count:
+        return []
+    return [f"--base-parameters prints {count} terms instead of {terms}"]
+
+
+def _term_count(shown: Sequence[Quantity]) -> int:
+    return sum(len(element) for quantity in shown for element in quantity.elements.flat)
 
 
 def _inverse(description: Description, form: str, output: Path | None, json: bool) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
@@ -16,8 +18,10 @@ from dhkit.model.mass_report import ReportedMass, read_mass_report
 from dhkit.model.shape_inertia import MassProperties, shape_inertia
 from dhkit.model.triangle_mesh import TriangleMesh, common_bounds
 
-_INTEGRATION_ERROR = 1e-13
-"""Coordinates and products below this share of a link's size and moments are set to 0: integrals are exact to 1e-15."""
+_MESH_DIGITS = 11
+"""Significant digits of mass properties from a mesh: text files have coordinates of up to nine."""
+_MESH_NOISE = 3e-10
+"""Coordinates and products below this share of a link's size and moments are rounding of the mesh's coordinates."""
 _MOMENT_TOLERANCE = 0.01
 """Share by which reported moments may exceed the possible ones: reports are rounded."""
 _USUAL_DENSITIES = (20.0, 25_000.0)
@@ -140,7 +144,7 @@ class StatedMasses:
         )
         basis = f"{density:.6g} kg/m^3" if stated is None else f"{stated:.6g} kg"
         notes = (f"body from {unit_body.method.value} and {basis}", *unit_body.notes)
-        return LinkBody(_without_rounding(properties, size), notes)
+        return LinkBody(_to_mesh_accuracy(properties, size), notes)
 
 
 def _reported_body(
@@ -176,10 +180,21 @@ def _reported_body(
     return LinkBody(body, tuple(notes))
 
 
-def _without_rounding(body: MassProperties, size: float) -> MassProperties:
-    """Return mass properties with 0 for coordinates and products that are rounding errors: people read the file."""
-    com = np.where(np.abs(body.com) < _INTEGRATION_ERROR * size, 0.0, body.com)
-    is_rounding = np.abs(body.inertia) < _INTEGRATION_ERROR * np.trace(body.inertia)
+def _to_mesh_accuracy(body: MassProperties, size: float) -> MassProperties:
+    """Return mass properties rounded to what the coordinates of a mesh can tell; ``size`` is the link's, m.
+
+    People read the file; and equations lose the terms that only rounding had made.
+    """
+    com = np.where(np.abs(body.com) < _MESH_NOISE * size, 0.0, body.com)
+    trace = float(np.trace(body.inertia))
+    is_noise = (np.abs(body.inertia) < _MESH_NOISE * trace) & ~np.eye(3, dtype=bool)
+    inertia = np.where(is_noise, 0.0, body.inertia)
     return MassProperties(
-        body.mass, com, np.where(is_rounding & ~np.eye(3, dtype=bool), 0.0, body.inertia)
+        _rounded(body.mass, body.mass).item(), _rounded(com, size), _rounded(inertia, trace)
     )
+
+
+def _rounded(values: ArrayLike, largest: float) -> Array:
+    """Return values rounded at the last significant digit of the largest; 0 without a sign."""
+    decimals = _MESH_DIGITS - 1 - math.floor(math.log10(largest))
+    return np.round(np.asarray(values, dtype=float), decimals) + 0.0

@@ -21,6 +21,8 @@ from dhkit.viewer.session import Slot
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+    from dhkit.planning.obstacles import Scene
+
 _OVERLAYS = (
     (Slot.POINTS, "points of the workspace", "#7f8794"),
     (Slot.ELLIPSOIDS, "ellipsoid: how fast the tool can move", "var(--accent)"),
@@ -53,6 +55,8 @@ class Snapshot:
         Names and colors (``#rrggbb``) of those ghosts that have names.
     trace
         Points that a line is drawn through, shape (N, 3), m, world; None for no line.
+    obstacles
+        Obstacles around the arm.
     """
 
     description: Description
@@ -63,6 +67,7 @@ class Snapshot:
     ghosts: tuple[Ghost, ...]
     ghost_names: tuple[tuple[str, str], ...]
     trace: Array | None
+    obstacles: Scene
 
 
 class Exportable(ABC):
@@ -175,6 +180,7 @@ class Exportable(ABC):
             frames=shown.frames,
             ghosts=shown.ghosts,
             path=shown.trace,
+            obstacles=shown.obstacles,
         )
 
     def save_png(self, path: str | Path, size: tuple[int, int] = (960, 720)) -> Path:
@@ -202,6 +208,7 @@ class Exportable(ABC):
             size=size,
             frames=shown.frames,
             ghosts=shown.ghosts,
+            obstacles=shown.obstacles,
         )
 
 

@@ -17,6 +17,8 @@ from dhkit.viewer.scene import node_transforms
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
+    from dhkit.planning.obstacles import Scene
+
 _GIF_COLORS = 128
 _MAX_PICTURES = 900
 """Most pictures of one GIF, or of one series of files."""
@@ -69,6 +71,7 @@ def write_motion_gif(
     size: tuple[int, int] = (480, 360),
     frames: bool = False,
     ghosts: Sequence[Ghost] = (),
+    obstacles: Scene = (),
     progress: Callable[[int, int], None] = lambda done, whole: None,
 ) -> Path:
     """Write a motion as a GIF in real time, with the tool's path, and a ghost at the reference of a simulation.
@@ -83,7 +86,7 @@ def write_motion_gif(
         The file.
     rate
         Pictures per second, Hz.
-    size, frames, ghosts
+    size, frames, ghosts, obstacles
         As for :func:`dhkit.viewer.pictures.picture`.
     progress
         Called with the number of pictures that are drawn, and of all.
@@ -105,7 +108,7 @@ def write_motion_gif(
 
     def images() -> Iterator[Picture]:
         for k, image in enumerate(
-            _motion_pictures(description, motion, count, size, frames, ghosts), start=1
+            _motion_pictures(description, motion, count, size, frames, ghosts, obstacles), start=1
         ):
             yield image
             progress(k, count)
@@ -122,11 +125,12 @@ def write_motion_pngs(
     size: tuple[int, int] = (960, 720),
     frames: bool = False,
     ghosts: Sequence[Ghost] = (),
+    obstacles: Scene = (),
 ) -> list[Path]:
     """Write ``count`` pictures of a motion at equal steps of time; each file is ``path`` with a number in its name."""
     path = Path(path)
     digits = len(str(count))
-    images = _motion_pictures(description, motion, count, size, frames, ghosts)
+    images = _motion_pictures(description, motion, count, size, frames, ghosts, obstacles)
     return [
         write_png(image, path.with_name(f"{path.stem}-{k:0{digits}}{path.suffix}"))
         for k, image in enumerate(images, 1)
@@ -140,6 +144,7 @@ def _motion_pictures(
     size: tuple[int, int],
     frames: bool,
     ghosts: Sequence[Ghost],
+    obstacles: Scene,
 ) -> Iterable[Picture]:
     if not 2 <= count <= _MAX_PICTURES:
         raise ValueError(f"{count} pictures; expected 2 to {_MAX_PICTURES}")
@@ -155,5 +160,6 @@ def _motion_pictures(
         frames=frames,
         ghosts=ghosts,
         path=path,
+        obstacles=obstacles,
         references=references,
     )

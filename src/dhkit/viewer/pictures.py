@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Mesh, Sphere
 from dhkit.description.frames import joint_array
@@ -31,6 +32,8 @@ from dhkit.viewer.scene import (
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+
+    from dhkit.planning.obstacles import Scene
 
 log = logging.getLogger(__name__)
 
@@ -56,6 +59,9 @@ _ROUND_SIDES = 40
 """Sides of a round solid."""
 _BLOCK_PIXELS = 4_000_000
 """Pixels of triangles that are drawn at once."""
+_OBSTACLE_OPACITY = 0.55
+_OBSTACLE_COLOR = (109, 91, 176)
+"""Red, green and blue of obstacles, as in the viewer."""
 _MIN_EDGE = 16
 """Smallest width and height of a picture, px."""
 _MAX_EDGE = 4000
@@ -97,6 +103,7 @@ def picture(
     frames: bool = False,
     ghosts: Sequence[Ghost] = (),
     path: ArrayLike | None = None,
+    obstacles: Scene = (),
 ) -> Image:
     """Return a picture of an arm.
 
@@ -114,6 +121,8 @@ def picture(
         Translucent copies of the arm.
     path
         Points that a line is drawn through, shape (N, 3), m, world.
+    obstacles
+        Translucent obstacles; a floor is the ground of the picture.
 
     Raises
     ------
@@ -130,7 +139,15 @@ def picture(
             f"q is {np.asarray(q).tolist()!r}; expected {description.n} finite joint values"
         )
     return next(
-        pictures(description, state[None], size=size, frames=frames, ghosts=ghosts, path=path)
+        pictures(
+            description,
+            state[None],
+            size=size,
+            frames=frames,
+            ghosts=ghosts,
+            path=path,
+            obstacles=obstacles,
+        )
     )
 
 
@@ -142,13 +159,14 @@ def pictures(
     frames: bool = False,
     ghosts: Sequence[Ghost] = (),
     path: ArrayLike | None = None,
+    obstacles: Scene = (),
     references: ArrayLike | None = None,
 ) -> Iterator[Image]:
     """Return pictures of an arm in several states, all seen from one place.
 
     Parameters
     ----------
-    description, size, frames, ghosts, path
+    description, size, frames, ghosts, path, obstacles
         As for :func:`picture`.
     q
         Joint values, shape (N, n), rad and m.
@@ -171,8 +189,11 @@ def pictures(
     if references is not None:
         moving = node_transforms(description, joint_array(description, references))
     points = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float)
+    # Obstacles stand still: they are of one more node, after the tool, which is the world.
+    around = _obstacle_solids(obstacles, transforms.shape[-3])
+    in_view = np.concatenate([points, *(solid.corners.reshape(-1, 3) for solid in around)])
     camera = _Camera.around(
-        description, _extent(description, solids, transforms, ghosts, points, frames), size
+        description, _extent(description, solids, transforms, ghosts, in_view, frames), size
     )
     ground = _draw_ground(description, camera)
     for nodes, reference in zip_longest(transforms, moving):
@@ -182,10 +203,13 @@ def pictures(
             *([] if reference is None else [Ghost(reference, _REFERENCE_COLOR)]),
         ):
             with_ghost = _draw_arm(solids, ghost.transforms, camera, image, np.array(ghost.color))
-            image = np.rint((1 - _GHOST_OPACITY) * image + _GHOST_OPACITY * with_ghost).astype(
-                np.uint8
-            )
-        image = _draw_arm(solids, nodes, camera, image)
+            image = _mixed(image, with_ghost, _GHOST_OPACITY)
+        arm = _draw_arm(solids, nodes, camera, image)
+        if around:
+            world = np.concatenate([nodes, np.eye(4)[None]])
+            covered = _draw_arm((*solids, *around), world, camera, image)
+            arm = _mixed(arm, covered, _OBSTACLE_OPACITY)
+        image = arm
         yield _finish(image, camera, description, nodes if frames else None, points)
 
 
@@ -201,6 +225,27 @@ def _solids(description: Description) -> tuple[_Solid, ...]:
             solids.append(_Solid(part.link, _triangles(part), color))
         except ModelError as error:  # the mesh has a valid header, and content that is not valid
             log.warning("%s; it is left out", error)
+    return tuple(solids)
+
+
+def _obstacle_solids(obstacles: Scene, node: int) -> tuple[_Solid, ...]:
+    """Return obstacles as solids of a node that is the world; a floor has none."""
+    from dhkit.planning.obstacles import Floor, check_obstacles
+
+    trimesh = imported("trimesh", "a picture")
+    ball = trimesh.creation.uv_sphere(1.0, count=[_ROUND_SIDES // 2, _ROUND_SIDES]).vertices
+    solids = []
+    for obstacle in check_obstacles(obstacles):
+        if isinstance(obstacle, Floor):
+            continue
+        # Each obstacle is a box of half edges h, each point of which is the centre of a ball of radius r: the hull of
+        # balls around the eight corners.
+        corners = np.array(list(product((-1.0, 1.0), repeat=3))) * obstacle.half_sizes
+        surface = corners[:, None] + obstacle.radius * ball
+        T = obstacle.T_world_obstacle
+        cloud = surface.reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
+        triangles = cloud[ConvexHull(cloud).simplices]
+        solids.append(_Solid(node, triangles, np.array(_OBSTACLE_COLOR, dtype=float)))
     return tuple(solids)
 
 
@@ -323,6 +368,11 @@ class _Camera:
 
 
 # Pixels
+
+
+def _mixed(below: NDArray[np.uint8], above: NDArray[np.uint8], opacity: float) -> NDArray[np.uint8]:
+    """Return an image with another over it that is translucent."""
+    return np.rint((1 - opacity) * below + opacity * above).astype(np.uint8)
 
 
 def _draw_arm(

@@ -91,6 +91,7 @@ class View(Exportable):
         self._ghosts: tuple[Ghost, ...] = ()
         self._ghost_names: tuple[tuple[str, str], ...] = ()
         self._trace: Array | None = None
+        self._obstacles: Scene = ()
         self.frames(frames)
         self.show(first_configuration(description))
 
@@ -330,7 +331,9 @@ class View(Exportable):
         ValueError
             The scene has more than one floor.
         """
-        boxes = rounded_boxes(() if obstacles is None else obstacles, scene_size(self._description))
+        scene = () if obstacles is None else tuple(obstacles)
+        boxes = rounded_boxes(scene, scene_size(self._description))
+        self._obstacles = scene
         self._publish(Slot.OBSTACLES, protocol.encode_obstacles(*boxes))
 
     def frames(self, visible: bool) -> None:
@@ -407,6 +410,7 @@ class View(Exportable):
                 self._ghosts,
                 self._ghost_names,
                 self._trace,
+                self._obstacles,
             )
 
     def _scene(self, description: Description) -> bytes:
