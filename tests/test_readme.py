@@ -10,6 +10,7 @@ from acceptance import slow_if
 from dhkit.bench import Mode, rounds
 from dhkit.cli import main
 from dhkit.description import read_robot
+from tools.readme_table import with_table
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text("utf-8")
 COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", README, re.MULTILINE)
@@ -50,6 +51,16 @@ def test_the_robot_file_of_the_readme_is_one(tmp_path):
     arm = read_robot(path)
     assert float(arm.numbers.a.sum()) == 0.8
     assert not arm.warnings
+
+
+def test_the_table_of_speed_is_that_of_the_benchmark():
+    """Run `python -m tools.readme_table` when this fails."""
+    assert with_table(README) == README
+
+
+def test_the_readme_is_short():
+    prose = re.sub(r"```.*?```", "", README, flags=re.DOTALL)
+    assert sum(bool(line.strip()) for line in prose.splitlines()) <= 120
 
 
 def test_the_documents_that_the_readme_names_are_there():
