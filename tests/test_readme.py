@@ -5,12 +5,12 @@ import shlex
 from pathlib import Path
 
 import pytest
+from tools.readme_table import with_table
 
 from acceptance import slow_if
 from dhkit.bench import Mode, rounds
 from dhkit.cli import main
 from dhkit.description import read_robot
-from tools.readme_table import with_table
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text("utf-8")
 COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", README, re.MULTILINE)

@@ -191,7 +191,8 @@ def test_long_decimals_are_rounded_unless_all_are_asked_for(dhkit, tmp_path):
     """Products of a CAD program's numbers have 70 digits."""
     file = tmp_path / "arm.toml"
     file.write_text(
-        'format = 1\nname = "cad"\nconvention = "standard"\n[[joint]]\ntype = "revolute"\na = 0.2512345678901\nalpha = 0\nd = 0\n'
+        'format = 1\nname = "cad"\nconvention = "standard"\n[[joint]]\ntype = "revolute"\n'
+        "a = 0.2512345678901\nalpha = 0\nd = 0\n"
         "theta = 0\nbody = { mass = 1.3173724319540, com = [-0.0960719135381, 0, 0], "
         "inertia = { xx = 0.0009098584633, yy = 0.0009406760040, zz = 0.0018250767915 } }\n"
     )
