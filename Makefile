@@ -7,6 +7,7 @@ TEST_READY := $(VENV)/.ready-test
 CHECK_READY := $(VENV)/.ready-check
 ACCEPT_READY := $(VENV)/.ready-accept
 BENCH_READY := $(VENV)/.ready-bench
+DOCS_READY := $(VENV)/.ready-docs
 # `make test ORDER=` runs the tests in random order.
 ORDER ?= -p no:randomly
 # `make test MARKS='not slow or browser'` runs the tests with a browser too, as .ci/run does.
@@ -19,7 +20,7 @@ unexport PYTHONDONTWRITEBYTECODE
 test test-all coverage: export OPENBLAS_NUM_THREADS = 1
 test test-all coverage: export OMP_NUM_THREADS = 1
 
-.PHONY: help demo test test-all coverage check accept bench assets lowest format clean
+.PHONY: help demo test test-all coverage check accept bench assets docs lowest format clean
 
 help:  ## show this list
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -75,6 +76,7 @@ bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside pe
 	$(BIN)/python -m benchmarks.scenes --kind spheres --scenes 48 --compared 0 --output benchmarks/results/scenes_spheres
 	$(BIN)/python -m benchmarks.scenes --kind itself --scenes 30 --compared 6 --output benchmarks/results/scenes_itself
 	$(BIN)/python -m benchmarks.control
+	$(BIN)/python -m tools.readme_table
 
 $(BENCH_READY): $(READY)
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
@@ -84,6 +86,14 @@ assets: $(READY)  ## generate urdf/, meshes/, the tables of docs/control.md and 
 	$(BIN)/python -m tools.assets
 	$(BIN)/python -m benchmarks.controllers
 	$(BIN)/python docs/screenshots.py
+
+docs: $(DOCS_READY)  ## the site in out/docs, with its pictures and tables; `dhkit docs` shows it
+	$(BIN)/python docs/make_site.py $(ARGS)
+
+$(DOCS_READY): pyproject.toml
+	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	@touch $(READY) $@
 
 lowest:  ## the tests with the oldest versions that pyproject.toml allows
 	$(PYTHON) -m venv $(VENV)-lowest

@@ -8,6 +8,7 @@ from . import (
     model as model,
     planning as planning,
     programs as programs,
+    report as report,
     symbolic as symbolic,
     trajectories as trajectories,
     verification as verification,
@@ -83,6 +84,7 @@ from .planning import (
     ToolSpeed as ToolSpeed,
     TorqueSpeedLine as TorqueSpeedLine,
 )
+from .report import Report as Report
 from .symbolic import (
     BaseParameters as BaseParameters,
     CasadiFunctions as CasadiFunctions,

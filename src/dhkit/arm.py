@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         Scene,
     )
     from dhkit.planning.request import PathKeywords, PlanKeywords
+    from dhkit.report import Report
     from dhkit.symbolic import (
         BaseParameters,
         CasadiFunctions,
@@ -123,6 +124,12 @@ class Arm:
             No such robot, or a file that does not describe a robot.
         ModelError
             A URDF that is refused, or has no such chain, or several and no tip was given.
+
+        Examples
+        --------
+        >>> arm = Arm.load("puma560")
+        >>> arm.n, arm.name
+        (6, 'puma560')
         """
         text = str(name)
         is_file = text.lower().endswith((".urdf", ".xacro"))
@@ -154,7 +161,36 @@ class Arm:
         exact: bool = False,
         package_dirs: Sequence[str | Path] = (),
     ) -> Arm:
-        """Return a chain of a URDF as an arm; see :func:`dhkit.model.extract_dh`, which also reports the steps.
+        """Return a chain of a URDF as an arm; :func:`dhkit.model.extract_dh` also reports the steps.
+
+        Parameters
+        ----------
+        name
+            Path of the URDF (``.urdf``, ``.xacro``), or ``example:NAME`` for a robot of the package example-robot-data;
+            ``#TIP`` or ``#BASE..TIP`` after it names the ends of the chain.
+        base, tip
+            First and last link of the chain; the root, and the end of the only chain, unless given.
+        convention
+            Convention of the table.
+        side
+            Treatment of links that hang on moving joints beside the chain: ``"freeze"`` carries them along with those
+            joints at zero, ``"drop"`` leaves them out.
+        as_designed
+            Whether rounded angles of the file, such as 1.5708, are read as the right angles that they stand for.
+        exact
+            Whether the file's axes are kept to the last digit; lengths of the table may then be large.
+        package_dirs
+            Folders with the packages that ``package://NAME/...`` names.
+
+        Returns
+        -------
+        Arm
+            The arm of the chain, with its bodies, limits and shapes.
+
+        Raises
+        ------
+        ModelError
+            The file is refused, or has no such chain, or several and no tip was given.
 
         Examples
         --------
@@ -195,7 +231,41 @@ class Arm:
         limits: Sequence[Sequence[Quantity] | None] | None = None,
         bodies: Sequence[Body | Mapping[str, object] | None] | None = None,
     ) -> Arm:
-        """Return the arm of a Denavit-Hartenberg table; see :func:`dhkit.description.from_dh`."""
+        """Return the arm of a Denavit-Hartenberg table.
+
+        Parameters
+        ----------
+        rows
+            One row a joint: four numbers, in the units given, or expressions as text, in metres and radians. In a row
+            by names, ``{"theta": 0, "d": 0.3, "a": 0, "alpha": "pi/2"}``, zeros may be left out.
+        order
+            Names of the columns, in their order.
+        kinds
+            One letter a joint: R or P; all revolute unless given.
+        convention
+            ``"standard"``, or ``"modified"``: row i then holds alpha_(i-1) and a_(i-1).
+        angle, length
+            Units of bare numbers: rad or deg; m, mm, cm or in.
+        name
+            The robot's name.
+        parameters
+            Values of the names that occur in text, SI and radians.
+        limits
+            Lowest and highest value of each joint, in the units given, or None.
+        bodies
+            Body of each link, as for :func:`dhkit.description.from_dh`, or None.
+
+        Raises
+        ------
+        DescriptionError
+            Another number of columns, an unknown kind, unit or convention, or a value that is not a finite number.
+
+        Examples
+        --------
+        >>> arm = Arm.from_dh([(0, 0.3, 0, "pi/2"), (0, 0, "l", 0)], parameters={"l": 0.5})
+        >>> arm.fk([0, 0])[:3, 3]
+        array([0.5, 0. , 0.3])
+        """
         return cls(
             describe.from_dh(
                 rows,
@@ -212,11 +282,47 @@ class Arm:
         )
 
     def with_tool(self, T: ArrayLike) -> Arm:
-        """Return this arm with its tool at the pose T (4, 4), m, in DH frame n."""
+        """Return this arm with another tool frame.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in DH frame n, shape (4, 4), m; it replaces the arm's own.
+
+        Raises
+        ------
+        ValueError
+            T is not a pose.
+
+        Examples
+        --------
+        >>> import dhkit
+        >>> arm = Arm.load("planar2r").with_tool(dhkit.pose((0.1, 0, 0)))
+        >>> arm.fk([0, 0])[:3, 3]
+        array([1., 0., 0.])
+        """
         return Arm(describe.with_tool(self._description, T))
 
     def with_base(self, T: ArrayLike) -> Arm:
-        """Return this arm with frame 0 at the pose T (4, 4), m, in the world."""
+        """Return this arm with its base elsewhere.
+
+        Parameters
+        ----------
+        T
+            Pose of frame 0 in the world, shape (4, 4), m; it replaces the arm's own.
+
+        Raises
+        ------
+        ValueError
+            T is not a pose.
+
+        Examples
+        --------
+        >>> import dhkit
+        >>> arm = Arm.load("planar2r").with_base(dhkit.pose((0, 0, 0.5)))
+        >>> arm.fk([0, 0])[:3, 3]
+        array([0.9, 0. , 0.5])
+        """
         return Arm(describe.with_base(self._description, T))
 
     def with_payload(
@@ -225,16 +331,51 @@ class Arm:
         com: Sequence[Quantity] = (0, 0, 0),
         inertia: ArrayLike | None = None,
     ) -> Arm:
-        """Return this arm with a payload: mass, kg, and com (3,), m, in the tool's frame.
+        """Return this arm with a rigid load on its last link.
 
-        See :func:`dhkit.description.with_payload`.
+        Parameters
+        ----------
+        mass
+            Mass, kg; text may use the arm's parameters. Or a :class:`dhkit.Payload`, which has all three values.
+        com
+            Centre of mass in the tool's frame, shape (3,), m.
+        inertia
+            Tensor about the load's centre of mass in the tool's axes, shape (3, 3), kg m^2; a point mass unless given.
+
+        Raises
+        ------
+        DescriptionError
+            The last link has no body, or the load is an impossible body.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> more = arm.with_payload(2.0).gravity_torque([0, 0]) - arm.gravity_torque([0, 0])
+        >>> more.round(3)                                   # 2 kg * 9.81 m/s^2, 0.9 m and 0.4 m from the axes
+        array([17.658,  7.848])
         """
         if isinstance(mass, describe.Payload):
             return Arm(mass.carried(self._description))
         return Arm(describe.with_payload(self._description, mass, com, inertia))
 
     def with_parameters(self, **values: Quantity) -> Arm:
-        """Return this arm with other values of its parameters, SI and radians."""
+        """Return this arm with other values of its parameters.
+
+        Parameters
+        ----------
+        **values
+            Values by name, SI and radians; text may name other parameters.
+
+        Raises
+        ------
+        DescriptionError
+            The arm has no such parameter, or the values make no robot.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").with_parameters(l1=0.6).fk([0, 0])[:3, 3]
+        array([1., 0., 0.])
+        """
         return Arm(describe.with_parameters(self._description, **values))
 
     def with_limits(
@@ -245,7 +386,31 @@ class Arm:
         velocity: ArrayLike | None = None,
         torque: ArrayLike | None = None,
     ) -> Arm:
-        """Return this arm with other limits, SI and radians; see :func:`dhkit.description.with_limits`."""
+        """Return this arm with other limits of its joints; those not given stay.
+
+        Parameters
+        ----------
+        lower, upper
+            Lowest and highest joint values, rad and m, one number for all joints or shape (n,). Infinite on both sides:
+            the joint is unlimited.
+        velocity
+            Largest speeds, rad/s and m/s, one number or shape (n,); inf: unlimited.
+        torque
+            Largest torques and forces, N m and N, one number or shape (n,); inf: unlimited.
+
+        Raises
+        ------
+        DescriptionError
+            A lower limit above the upper one, one side infinite, NaN, or a speed or torque that is not positive.
+        ValueError
+            Another shape.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r").with_limits(velocity=[1.0, 2.0])
+        >>> arm.limits.velocity
+        array([1., 2.])
+        """
         return Arm(
             describe.with_limits(
                 self._description, lower=lower, upper=upper, velocity=velocity, torque=torque
@@ -253,13 +418,50 @@ class Arm:
         )
 
     def with_uniform_links(self, masses: Sequence[Quantity] | None = None) -> Arm:
-        """Return this arm whose links are thin uniform rods; see :func:`dhkit.description.with_uniform_links`."""
+        """Return this arm with each link a thin uniform rod, its mass a parameter ``m1`` ... ``mn``.
+
+        Link i lies from frame i-1's origin to frame i's, in the modified convention from frame i's to frame i+1's; the
+        last ends at the tool. See :func:`dhkit.description.with_uniform_links`.
+
+        Parameters
+        ----------
+        masses
+            One mass a link, kg; 1 kg each unless given.
+
+        Raises
+        ------
+        DescriptionError
+            Another number of masses, or ``m1`` ... is a parameter with a meaning of its own.
+
+        Examples
+        --------
+        >>> arm = Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)]).with_uniform_links([2.0, 1.0])
+        >>> print(arm.lagrangian.text(("M",)).splitlines()[2])
+        M22 = 4*m2/75
+        """
         return Arm(describe.with_uniform_links(self._description, masses))
 
     def lock(self, joints: Mapping[int | str, Quantity]) -> Arm:
-        """Return this arm with joints locked, by index from 0 or by name; see :func:`dhkit.description.lock`.
+        """Return this arm with joints locked; their links are joined to the links before them.
 
-        Links keep the shapes that they are drawn with.
+        Masses, limits and drives of the remaining joints stay; links keep the shapes that they are drawn with. See
+        :func:`dhkit.description.lock`.
+
+        Parameters
+        ----------
+        joints
+            Value at which each joint is locked, rad or m, by the joint's place from 0 or by its name.
+
+        Raises
+        ------
+        DescriptionError
+            No such joint, one named twice, or none left to move.
+
+        Examples
+        --------
+        >>> arm = Arm.load("puma560").lock({0: 0.0, "elbow": -1.57})
+        >>> arm.n, arm.joint_names
+        (4, ('shoulder', 'wrist_roll', 'wrist_pitch', 'flange_roll'))
         """
         from dhkit.model.shapes import with_drawn_shapes
 
@@ -295,7 +497,17 @@ class Arm:
         return Limits.of(self._description)
 
     def save(self, path: str | Path) -> tuple[Path, ...]:
-        """Write the arm's robot file (``.toml``), with its meshes beside it; return the files, the robot file first.
+        """Write the arm's robot file, with its meshes beside it.
+
+        Parameters
+        ----------
+        path
+            The file, which ends in ``.toml``.
+
+        Returns
+        -------
+        tuple[Path, ...]
+            The files written, the robot file first.
 
         Raises
         ------
@@ -303,6 +515,13 @@ class Arm:
             Another suffix than ``.toml``.
         ModelError
             A file cannot be read or written.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").save("mine.toml")[0].name
+        'mine.toml'
+        >>> Arm.load("./mine.toml") == Arm.load("planar2r")
+        True
         """
         from dhkit.model import write_robot_with_meshes
 
@@ -330,6 +549,10 @@ class Arm:
         ----------
         progress
             Called with the number of compiled kernels and of all kernels.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").compile()
         """
         from dhkit.dynamics import dynamic_kernels
         from dhkit.kinematics import kinematic_kernels
@@ -343,13 +566,67 @@ class Arm:
     # Kinematics
 
     def fk(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the tool's pose in the world, shape (..., 4, 4), m, for q (..., n), rad and m."""
+        """Return the pose of the tool in the world.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., 4, 4), m; NaN where q is not finite.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> arm.fk([0, np.pi / 2])[:3, 3].round(3)
+        array([0.5, 0.4, 0. ])
+        >>> arm.fk(np.zeros((1000, 2))).shape
+        (1000, 4, 4)
+        """
         from dhkit.kinematics import forward_kinematics
 
         return forward_kinematics(self._description, q, out, threads)
 
     def frames(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4), m, for q (..., n), rad and m."""
+        """Return the poses of all DH frames in the world.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Frames 0 ... n, shape (..., n+1, 4, 4), m; frame 0 is the base.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").frames([0, 0])[:, 0, 3]      # x of the origins
+        array([0. , 0.5, 0.9])
+        """
         from dhkit.kinematics import frames
 
         return frames(self._description, q, out, threads)
@@ -361,10 +638,37 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the tool's Jacobian, shape (..., 6, n), m and rad: linear velocity of the tool's origin, then angular.
+        """Return the tool's geometric Jacobian.
 
-        ``frame="world"`` gives both in the world's axes (Pinocchio's LOCAL_WORLD_ALIGNED, not its WORLD), ``"tool"`` in
-        the tool's (Pinocchio's LOCAL).
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        frame
+            ``"world"``: both velocities in the world's axes (Pinocchio's LOCAL_WORLD_ALIGNED, not its WORLD).
+            ``"tool"``: in the tool's axes (Pinocchio's LOCAL).
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., 6, n): rows 0 to 2 the velocity of the tool's origin, m, rows 3 to 5 the angular velocity, rad.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> J = Arm.load("planar2r").jacobian([0, 0])
+        >>> J[[0, 1, 5]]                                      # x, y and the rotation about z
+        array([[0. , 0. ],
+               [0.9, 0.4],
+               [1. , 1. ]])
         """
         from dhkit.kinematics import jacobian
 
@@ -378,7 +682,37 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the Jacobian's time derivative at q, qd (..., n), shape (..., 6, n), m/s and rad/s."""
+        """Return the time derivative of the tool's Jacobian.
+
+        Parameters
+        ----------
+        q, qd
+            Joint values and rates, shape (..., n), rad, m and per second; batch axes broadcast.
+        frame
+            As for :meth:`jacobian`.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., 6, n), m/s and rad/s.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> q, qd, qdd = [0.3, 0.4], [1.0, -1.0], [0.0, 0.5]
+        >>> acceleration = arm.jacobian(q) @ qdd + arm.jacobian_dot(q, qd) @ qd
+        >>> acceleration.shape
+        (6,)
+        """
         from dhkit.kinematics import jacobian_dot
 
         return jacobian_dot(self._description, q, qd, frame, out, threads)
@@ -390,10 +724,45 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> IKSolutions:
-        """Return all closed-form solutions of fk(q) = T for poses (..., 4, 4), m.
+        """Return all closed-form solutions of fk(q) = T.
 
-        See :func:`dhkit.kinematics.inverse_kinematics`; ``seed`` (n,) sets the joint that is free at a wrist
-        singularity.
+        See :func:`dhkit.kinematics.inverse_kinematics`.
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (..., 4, 4), m.
+        seed
+            Joint values, shape (n,) or (..., n), rad and m, from which a joint takes its angle that is free at a
+            singularity; 0 unless given.
+        out
+            Array that receives the joint values, shape (..., B, n), float64, C-contiguous. Only for closed forms.
+        threads
+            Number of threads that share a large batch. Only for closed forms.
+
+        Returns
+        -------
+        IKSolutions
+            B branches in a fixed order: ``q`` (..., B, n), ``valid`` (..., B), and a status for each pose. A pose that
+            is out of reach is a status, not an exception.
+
+        Raises
+        ------
+        ModelError
+            The arm has no closed form, and the package ssik is not installed or does not accept it.
+        ValueError, TypeError
+            T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("puma560")
+        >>> T = arm.fk("nominal")
+        >>> solutions = arm.ik(T)
+        >>> solutions.q.shape, int(solutions.valid.sum())
+        ((8, 6), 8)
+        >>> bool(np.allclose(arm.fk(solutions.q), T))
+        True
         """
         from dhkit.kinematics import inverse_kinematics
 
@@ -402,10 +771,36 @@ class Arm:
     def ik_chunks(
         self, T: ArrayLike, size: int = 16_384, seed: ArrayLike | None = None, threads: int = 1
     ) -> Iterator[tuple[slice, IKSolutions]]:
-        """Yield slices of poses (N, 4, 4), m, and their solutions, which the next chunk overwrites.
+        """Yield slices of many poses, and their solutions, in memory that is used again.
 
-        Several times faster than one call for a million poses; see
-        :func:`dhkit.kinematics.inverse_kinematics_in_chunks`.
+        Several times faster than one call for a million poses: new memory costs more time than the solutions.
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (N, 4, 4), m.
+        size
+            Number of poses in a chunk.
+        seed, threads
+            As for :meth:`ik`.
+
+        Returns
+        -------
+        Iterator[tuple[slice, IKSolutions]]
+            Slice of the poses, and their solutions. The next chunk overwrites the joint values: copy what you keep.
+
+        Raises
+        ------
+        ModelError, ValueError, TypeError
+            As for :meth:`ik`; ``size`` is below 1.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> poses = arm.fk(np.random.default_rng(0).uniform(-1, 1, (1000, 2)))
+        >>> sum(int(found.valid.sum()) for _, found in arm.ik_chunks(poses, size=256))
+        2000
         """
         from dhkit.kinematics import inverse_kinematics_in_chunks
 
@@ -424,7 +819,48 @@ class Arm:
         threads: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> IKSolutions:
-        """Return one solution per pose by iteration, for any arm; see :func:`dhkit.kinematics.solve_numerically`."""
+        """Return one solution of fk(q) = T for each pose by iteration, for any arm.
+
+        See :func:`dhkit.kinematics.solve_numerically` for the method.
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (..., 4, 4), m.
+        q0
+            Start, shape (n,) or (..., n), rad and m; the middle of the limits unless given.
+        position_only
+            Whether only the tool's position is to be reached.
+        restarts
+            Largest number of further starts for a pose.
+        tolerance
+            Largest error: position as a share of the reach, rotation in rad.
+        seed
+            Seed of the random starts.
+        limits
+            Whether joints stay inside their limits.
+        threads
+            Number of threads that share a large batch.
+        progress
+            Called with the number of finished poses and of all; an exception in it ends the work.
+
+        Returns
+        -------
+        IKSolutions
+            One branch; the status of a pose says whether it was found.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape or type.
+
+        Examples
+        --------
+        >>> arm = Arm.load("panda")
+        >>> found = arm.ik_numeric(arm.fk("ready"))
+        >>> str(found.status), found.q.shape
+        ('ok', (1, 7))
+        """
         from dhkit.kinematics import solve_numerically
 
         return solve_numerically(
@@ -441,7 +877,39 @@ class Arm:
         )
 
     def ik_path(self, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
-        """Follow one branch along poses (N, 4, 4) from near q0; see :func:`dhkit.kinematics.follow_path`."""
+        """Follow one branch of the inverse kinematics along a path of poses.
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (N, 4, 4), m, near enough to each other for joints to move less than
+            45 degrees (or an eighth of the reach) between them.
+        q0
+            Joint values near which the path starts, shape (n,), rad and m.
+        limits
+            Whether solutions outside the joint limits are left out.
+
+        Returns
+        -------
+        IKPath
+            Joint values (N, n), and the poses where the branch was switched, lost, or near a singularity.
+
+        Raises
+        ------
+        ValueError
+            T has not shape (N, 4, 4), or q0 not (n,) or not finite.
+        ModelError
+            The arm has no closed form, and ssik is not installed or does not accept it.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("puma560")
+        >>> line = np.repeat(arm.fk("nominal")[None], 50, axis=0)
+        >>> line[:, 1, 3] += np.linspace(0, 0.2, 50)
+        >>> arm.ik_path(line, q0="nominal")
+        <IKPath of 50 poses: 0 switches, 0 lost, 0 near a singularity>
+        """
         from dhkit.kinematics import follow_path
 
         return follow_path(self._description, T, q0, limits=limits)
@@ -454,7 +922,35 @@ class Arm:
         return classify(self._description)
 
     def manipulability(self, q: ArrayLike, motion: Motion = "translational") -> Array:
-        """Return the manipulability at q (..., n), shape (...); see :func:`dhkit.kinematics.manipulability`."""
+        """Return Yoshikawa's manipulability, sqrt(det(J J^T)).
+
+        For an arm that can never move its tool in all directions, it is the product of the largest singular values. See
+        :func:`dhkit.kinematics.manipulability`.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        motion
+            Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``. ``"whole"`` mixes
+            m and rad: its values depend on the unit of length.
+
+        Returns
+        -------
+        Array
+            Shape (...); 0 at a singularity, NaN where q is not finite.
+
+        Raises
+        ------
+        ValueError, TypeError
+            q has not shape (..., n); another motion.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> float(Arm.load("planar2r").manipulability([0.2, np.pi / 2]).round(6))   # l1 l2 abs(sin q2)
+        0.2
+        """
         from dhkit.kinematics import manipulability
 
         return manipulability(self._description, q, motion)
@@ -468,7 +964,37 @@ class Arm:
         threads: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> Workspace:
-        """Return the positions that the tool can reach, from random states; see :func:`dhkit.kinematics.workspace`."""
+        """Return the positions that the tool reaches, from random states, with the manipulability there.
+
+        Parameters
+        ----------
+        samples
+            Number of random states, uniform inside the joint limits.
+        seed
+            Seed of the random states.
+        edge
+            Edge of the grid's cells, m; chosen by the number of samples unless given.
+        threads
+            Number of threads that share the kinematics.
+        progress
+            Called with the number of finished samples and of all; an exception in it ends the work.
+
+        Returns
+        -------
+        Workspace
+            Positions (samples, 3), m, and estimates of area or volume; it is sampled, not proved.
+
+        Raises
+        ------
+        ValueError
+            ``samples`` is below 1, or ``edge`` is not positive or makes too many cells.
+
+        Examples
+        --------
+        >>> space = Arm.load("planar2r").workspace(samples=5000)
+        >>> [round(float(r), 1) for r in space.radii]          # least and largest distance from axis 1, m
+        [0.2, 0.9]
+        """
         from dhkit.kinematics import workspace
 
         return workspace(
@@ -476,31 +1002,123 @@ class Arm:
         )
 
     def singularities(self) -> Singularities:
-        """Return the singularities of the arm in closed form; see :func:`dhkit.kinematics.singularities`."""
+        """Return the singularities of the arm in closed form.
+
+        Returns
+        -------
+        Singularities
+            Conditions on the joint values, which print as text.
+
+        Raises
+        ------
+        ModelError
+            No closed form of this arm's singularities is known.
+
+        Examples
+        --------
+        >>> print(Arm.load("planar2r").singularities())
+        elbow: q2 = 0° (stretched) or 180° (folded)
+        """
         from dhkit.kinematics import singularities
 
         return singularities(self._description)
 
     def export_c(self, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
-        """Write the kinematics as C99 source and header; see :func:`dhkit.kinematics.export_kinematics`.
+        """Write forward kinematics, Jacobian and closed-form inverse kinematics as C99 source and header.
 
-        Inverse kinematics to be read: :meth:`export_ik`.
+        See :func:`dhkit.kinematics.export_kinematics`. Inverse kinematics to be read: :meth:`export_ik`.
+
+        Parameters
+        ----------
+        folder
+            An existing folder.
+        name
+            Name of the files and beginning of the functions' names, an identifier of C; the robot's unless given.
+
+        Returns
+        -------
+        tuple[Path, Path]
+            Source and header: self-contained C99; link with ``-lm``.
+
+        Raises
+        ------
+        ValueError
+            ``name`` is not an identifier of C.
+        OSError
+            The folder cannot be written to.
+
+        Examples
+        --------
+        >>> [path.name for path in Arm.load("planar2r").export_c(".")]
+        ['planar2r.c', 'planar2r.h']
         """
         from dhkit.kinematics import export_kinematics
 
         return export_kinematics(self._description, folder, name)
 
     def export_ik(self, folder: str | Path, language: str = "c") -> tuple[Path, ...]:
-        """Write closed-form inverse kinematics in ``"c"``, ``"python"`` or ``"matlab"``, step by step as derived.
+        """Write closed-form inverse kinematics as code, step by step as derived.
 
-        The files need no library; see :meth:`dhkit.symbolic.InverseDerivation.export`.
+        See :meth:`dhkit.symbolic.InverseDerivation.export`.
+
+        Parameters
+        ----------
+        folder
+            An existing folder.
+        language
+            ``"c"``, ``"python"`` or ``"matlab"``.
+
+        Returns
+        -------
+        tuple[Path, ...]
+            The files written; they need no library.
+
+        Raises
+        ------
+        DescriptionError
+            The arm has no closed form.
+        ValueError
+            Another language.
+
+        Examples
+        --------
+        >>> [path.name for path in Arm.load("planar2r").export_ik(".", "python")]
+        ['planar2r_ik.py']
         """
         return self.symbolic.ik.export(folder, language)
 
     # Dynamics
 
     def mass_matrix(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the mass matrix M with drives, shape (..., n, n), kg m^2, kg m and kg, for q (..., n), rad and m."""
+        """Return the mass matrix M, with the drives' reflected inertia.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n, n), symmetric, kg m^2, kg m and kg; NaN where q is not finite.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").mass_matrix([0, 0]).round(4)
+        array([[0.9217, 0.23  ],
+               [0.23  , 0.08  ]])
+        """
         from dhkit.dynamics import mass_matrix
 
         return mass_matrix(self._description, q, out, threads)
@@ -508,13 +1126,68 @@ class Arm:
     def coriolis_matrix(
         self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
     ) -> Array:
-        """Return the Coriolis matrix C by Christoffel symbols, shape (..., n, n), so that C qd is in N m and N."""
+        """Return the Coriolis matrix C by Christoffel symbols, so that C qd are torques.
+
+        Parameters
+        ----------
+        q, qd
+            Joint values and rates, shape (..., n), rad, m and per second; batch axes broadcast.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n, n); C qd is in N m and N. The factorization is that of Pinocchio's computeCoriolisMatrix.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").coriolis_matrix([0, 1.0], [1.0, 0.5]).round(4)
+        array([[-0.0631, -0.1893],
+               [ 0.1262,  0.    ]])
+        """
         from dhkit.dynamics import coriolis_matrix
 
         return coriolis_matrix(self._description, q, qd, out, threads)
 
     def gravity_torque(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the torques g that hold the arm at rest, shape (..., n), N m and N."""
+        """Return the torques g that hold the arm at rest.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n), N m and N.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").gravity_torque([0, 0]).round(3)
+        array([15.206,  2.943])
+        """
         from dhkit.dynamics import gravity_torque
 
         return gravity_torque(self._description, q, out, threads)
@@ -522,7 +1195,38 @@ class Arm:
     def bias(
         self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
     ) -> Array:
-        """Return C qd + g, shape (..., n), N m and N."""
+        """Return the torques C qd + g of a motion without acceleration.
+
+        Parameters
+        ----------
+        q, qd
+            Joint values and rates, shape (..., n), rad, m and per second; batch axes broadcast.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n), N m and N.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> q, qd = [0.2, 0.4], [1.0, 0.5]
+        >>> h = arm.coriolis_matrix(q, qd) @ qd
+        >>> bool(np.allclose(arm.bias(q, qd), h + arm.gravity_torque(q)))
+        True
+        """
         from dhkit.dynamics import bias
 
         return bias(self._description, q, qd, out, threads)
@@ -537,9 +1241,42 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the joint torques of a motion, shape (..., n), N m and N.
+        """Return the joint torques of a motion, tau = M qdd + C qd + g + friction - J^T wrench.
 
-        See :func:`dhkit.dynamics.inverse_dynamics`; ``wrench`` (..., 6) acts on the tool from outside, N and N m.
+        Parameters
+        ----------
+        q, qd, qdd
+            Joint values, rates and accelerations, shape (..., n), rad, m and seconds; batch axes broadcast.
+        wrench
+            Shape (..., 6): force, N, then moment, N m, that the environment applies at the tool's origin, in the
+            world's axes.
+        friction
+            True for dry friction as a step, 0 at rest; ``Friction(width=...)`` for a smooth one.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n), N m and N; NaN where an input is not finite.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> q, qd, qdd = [0.3, -0.5], [1.0, 0.2], [0.5, -1.0]
+        >>> tau = arm.inverse_dynamics(q, qd, qdd)
+        >>> bool(np.allclose(tau, arm.mass_matrix(q) @ qdd + arm.bias(q, qd)))
+        True
         """
         from dhkit.dynamics import inverse_dynamics
 
@@ -555,9 +1292,41 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the joint accelerations under torques, shape (..., n), rad/s^2 and m/s^2.
+        """Return the joint accelerations under torques: M qdd = tau - C qd - g - friction + J^T wrench.
 
-        See :func:`dhkit.dynamics.forward_dynamics`.
+        Parameters
+        ----------
+        q, qd, tau
+            Joint values, rates and torques, shape (..., n), rad, m, seconds, N m and N; batch axes broadcast.
+        wrench
+            Shape (..., 6): force, N, then moment, N m, that the environment applies at the tool's origin, in the
+            world's axes.
+        friction
+            True for dry friction as a step, 0 at rest; ``Friction(width=...)`` for a smooth one.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n), rad/s^2 and m/s^2; NaN where an input is not finite, or M is singular at this state.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body; joints that carry no inertia at any state.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> tau = arm.inverse_dynamics([0.3, -0.5], [1.0, 0.2], [0.5, -1.0])
+        >>> bool(np.allclose(arm.forward_dynamics([0.3, -0.5], [1.0, 0.2], tau), [0.5, -1.0]))
+        True
         """
         from dhkit.dynamics import forward_dynamics
 
@@ -566,19 +1335,97 @@ class Arm:
     def kinetic_energy(
         self, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
     ) -> Array:
-        """Return the kinetic energy with drives, shape (...), J."""
+        """Return the kinetic energy of links and drives, qd^T M qd / 2.
+
+        Parameters
+        ----------
+        q, qd
+            Joint values and rates, shape (..., n), rad, m and per second; batch axes broadcast.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (...), J.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> float(Arm.load("planar2r").kinetic_energy([0, 0], [1.0, 0.0]).round(4))
+        0.4608
+        """
         from dhkit.dynamics import kinetic_energy
 
         return kinetic_energy(self._description, q, qd, out, threads)
 
     def potential_energy(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-        """Return the potential energy, shape (...), J, 0 for a mass at the world's origin."""
+        """Return the potential energy in gravity, 0 for a mass at the world's origin.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (...), J.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> float(Arm.load("planar2r").potential_energy([np.pi / 2, 0]).round(3))   # both links upright
+        15.206
+        """
         from dhkit.dynamics import potential_energy
 
         return potential_energy(self._description, q, out, threads)
 
     def power(self, qd: ArrayLike, tau: ArrayLike, out: Array | None = None) -> Array:
-        """Return the mechanical power of the joints, qd . tau, shape (...), W."""
+        """Return the mechanical power of the joints, qd . tau.
+
+        Parameters
+        ----------
+        qd, tau
+            Joint rates and torques, shape (..., n), rad/s, m/s, N m and N; batch axes broadcast.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+
+        Returns
+        -------
+        Array
+            Shape (...), W.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> float(Arm.load("planar2r").power([1.0, 2.0], [3.0, 0.5]))
+        4.0
+        """
         from dhkit.dynamics import power
 
         return power(self._description, qd, tau, out)
@@ -590,7 +1437,35 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
     ) -> Array:
-        """Return the friction torques, shape (..., n), N m and N; see :func:`dhkit.dynamics.friction_torque`."""
+        """Return the friction torques: viscous, and dry friction that differs by direction.
+
+        Parameters
+        ----------
+        qd
+            Joint rates, shape (..., n), rad/s and m/s.
+        friction
+            Model of dry friction near rest; a step, 0 at rest, unless given.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n), joint side, N m and N, with the sign of the motion: the torque that a motor must add.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> Arm.load("puma560").friction_torque(np.full(6, 0.5)).round(2)
+        array([27.63, 18.33,  9.08,  1.06,  0.88,  0.41])
+        """
         from dhkit.dynamics import friction_torque
 
         return friction_torque(self._description, qd, friction, out, threads)
@@ -615,7 +1490,48 @@ class Arm:
         options: SimulationOptions | None = None,
         **keywords: Unpack[SimulationKeywords],
     ) -> SimulationResult:
-        """Simulate the arm under a controller; see :func:`dhkit.control.simulate`."""
+        """Simulate the arm under a controller, sampled at a rate or continuous.
+
+        See :func:`dhkit.control.simulate` for the integration.
+
+        Parameters
+        ----------
+        controller
+            Called as ``controller(t, q, qd, setpoint)``, returns torques (n,), N m and N; no torques unless given. See
+            :class:`dhkit.control.Controller`.
+        reference
+            The reference to follow: a motion, joint values (n,) or a pose of the tool (4, 4) to hold; ``q0`` unless
+            given.
+        duration
+            Simulated time, s; that of the reference unless given.
+        q0, qd0
+            Joint values and rates at the start, shape (n,), rad, m and per second; the reference's first joint values
+            and zero rates unless given.
+        options, **keywords
+            Fields of :class:`dhkit.SimulationOptions`, as one value or one by one: ``plant``, ``friction``,
+            ``restitution``, ``pushes``, ``rate``, ``plant_rate``, ``sensors``, ``saturation``, ``tolerance``,
+            ``progress``.
+
+        Returns
+        -------
+        SimulationResult
+            The run: times, states, torques, errors, and an audit of the energy.
+
+        Raises
+        ------
+        SimulationError
+            The controller raises or returns something else than a finite array (n,), or the state is no longer finite;
+            ``result`` of the error holds the rows until then.
+
+        Examples
+        --------
+        >>> import dhkit
+        >>> arm = Arm.load("planar2r")
+        >>> motion = arm.quintic([0, 0], [1.0, 0.5], duration=1.0)
+        >>> run = arm.simulate(dhkit.ComputedTorque.tuned(arm), motion)
+        >>> bool(run.peak_error.max() < 1e-3)                 # rad
+        True
+        """
         from dhkit.control import simulate
 
         return simulate(
@@ -633,7 +1549,45 @@ class Arm:
         options: BatchOptions | None = None,
         **keywords: Unpack[BatchKeywords],
     ) -> BatchResult:
-        """Simulate a batch of arms, with their states advanced together; see :func:`dhkit.control.simulate_batch`."""
+        """Simulate a batch of arms under one controller, with their states advanced together.
+
+        There are no joint stops, no pushes and no stiction; dry friction has to be smooth. See
+        :func:`dhkit.control.simulate_batch`.
+
+        Parameters
+        ----------
+        controller
+            Called for all arms at once, with joint values and rates (B, n); returns torques (B, n). No torques unless
+            given.
+        reference
+            A motion, or joint values (n,) or (B, n) to hold; ``q0`` unless given.
+        duration
+            Simulated time, s; that of the reference unless given.
+        q0, qd0
+            Joint values and rates at the start, shape (n,) or (B, n), rad, m and per second.
+        options, **keywords
+            Fields of :class:`dhkit.BatchOptions`, as one value or one by one: ``plant``, ``friction``, ``rate``,
+            ``plant_rate``, ``keep``, ``sensors``, ``saturation``, ``threads``, ``progress``.
+
+        Returns
+        -------
+        BatchResult
+            The runs.
+
+        Raises
+        ------
+        SimulationError
+            The controller raises or returns another shape.
+
+        Examples
+        --------
+        >>> import dhkit, numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> starts = np.random.default_rng(0).uniform(-0.1, 0.1, (100, 2))
+        >>> runs = arm.simulate_batch(dhkit.PDGravity.tuned(arm), [0.0, 0.0], 2.0, q0=starts)
+        >>> bool(abs(runs.q[-1]).max() < 1e-3)
+        True
+        """
         from dhkit.control import simulate_batch
 
         return simulate_batch(
@@ -653,7 +1607,31 @@ class Arm:
         options: SimulationOptions | None = None,
         **keywords: Unpack[SimulationKeywords],
     ) -> Comparison:
-        """Return how controllers follow a motion, all of dhkit's or chosen ones; see :func:`dhkit.control.compare`.
+        """Return how several controllers follow one motion, each starting on it.
+
+        Parameters
+        ----------
+        reference
+            The motion.
+        controllers
+            Names from ``dhkit.control.CONTROLLERS``, tuned alike, all of them unless given; or a mapping of names of
+            your own to controllers or such names.
+        bandwidth
+            Bandwidth of the controllers given by name, rad/s.
+        damping
+            Their damping ratio.
+        duration, q0, qd0, options, **keywords
+            As for :meth:`simulate`.
+
+        Returns
+        -------
+        Comparison
+            A table of errors and torques; prints as text.
+
+        Raises
+        ------
+        ValueError
+            No such controller.
 
         Examples
         --------
@@ -678,7 +1656,31 @@ class Arm:
         )
 
     def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return A (2n, 2n) and B (2n, n), SI units, of the arm near a state; see :func:`dhkit.control.linearize`."""
+        """Return the linear system dx/dt = A x + B u of the arm near a state, by exact derivatives.
+
+        Parameters
+        ----------
+        q, qd
+            The state, shape (n,), rad, m and per second; at rest unless ``qd`` is given.
+
+        Returns
+        -------
+        tuple[Array, Array]
+            A, shape (2n, 2n), and B, shape (2n, n), SI units; u is tau minus C qd + g.
+
+        Raises
+        ------
+        ValueError
+            A state that is not (n,) and finite.
+        DescriptionError
+            A link without a body.
+
+        Examples
+        --------
+        >>> A, B = Arm.load("planar2r").linearize([0, 0])
+        >>> A.shape, B.shape
+        ((4, 4), (4, 2))
+        """
         from dhkit.control import linearize
 
         return linearize(self._description, q, qd)
@@ -695,7 +1697,43 @@ class Arm:
         limits: Limits | None = None,
         torques: Torques | None = None,
     ) -> Trajectory:
-        """Return the cubic motion between two configurations; see :func:`dhkit.trajectories.cubic`."""
+        """Return the cubic polynomials of time between two configurations.
+
+        Craig 2005, Introduction to Robotics, section 7.3.
+
+        Parameters
+        ----------
+        q0, q1
+            Start and goal, shape (n,), rad and m.
+        duration
+            Duration, s; the shortest from rest to rest that the limits allow unless given.
+        qd0, qd1
+            Rates at both ends, shape (n,), rad/s and m/s; 0 unless given.
+        limits
+            Limits that the motion keeps; the arm's own unless given, without those of torque where a link has no body.
+            A given duration is then held against the joints' ranges alone.
+        torques
+            Torques of a motion to use instead of the arm's, as for :func:`dhkit.trajectories.least_slowdown`.
+
+        Returns
+        -------
+        Trajectory
+            The motion: ``q(t)``, ``qd(t)``, ``qdd(t)``, ``tau(t)``.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, or rates without a duration.
+        PlanningError
+            A joint leaves its limits on the way, the duration is too short for the limits given, or no duration keeps
+            them.
+
+        Examples
+        --------
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.q(1.0), motion.qd(1.0)
+        (array([0.25, 0.5 ]), array([0.375, 0.75 ]))
+        """
         from dhkit.trajectories import cubic
 
         return cubic(self._description, q0, q1, duration, qd0, qd1, limits, torques)
@@ -712,7 +1750,43 @@ class Arm:
         limits: Limits | None = None,
         torques: Torques | None = None,
     ) -> Trajectory:
-        """Return the quintic motion between two configurations; see :func:`dhkit.trajectories.quintic`."""
+        """Return the quintic polynomials of time between two configurations.
+
+        Parameters
+        ----------
+        q0, q1
+            Start and goal, shape (n,), rad and m.
+        duration
+            Duration, s; the shortest from rest to rest that the limits allow unless given.
+        qd0, qd1
+            Rates at both ends, shape (n,), rad/s and m/s; 0 unless given.
+        qdd0, qdd1
+            Accelerations at both ends, shape (n,), per second squared; 0 unless given.
+        limits
+            Limits that the motion keeps; the arm's own unless given, without those of torque where a link has no body.
+            A given duration is then held against the joints' ranges alone.
+        torques
+            Torques of a motion to use instead of the arm's, as for :func:`dhkit.trajectories.least_slowdown`.
+
+        Returns
+        -------
+        Trajectory
+            The motion.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, or rates without a duration.
+        PlanningError
+            A joint leaves its limits on the way, the duration is too short for the limits given, or no duration keeps
+            them.
+
+        Examples
+        --------
+        >>> motion = Arm.load("planar2r").quintic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.qdd(0.0), motion.q(2.0)
+        (array([0., 0.]), array([0.5, 1. ]))
+        """
         from dhkit.trajectories import quintic
 
         return quintic(self._description, q0, q1, duration, qd0, qd1, qdd0, qdd1, limits, torques)
@@ -726,7 +1800,37 @@ class Arm:
         limits: Limits | None = None,
         torques: Torques | None = None,
     ) -> Trajectory:
-        """Return the motion of trapezoidal velocity; see :func:`dhkit.trajectories.trapezoidal`.
+        """Return the motion of trapezoidal velocity between two configurations, all joints together.
+
+        Linear with parabolic blends: Craig 2005, section 7.3.
+
+        Parameters
+        ----------
+        q0, q1
+            Start and goal, shape (n,), rad and m.
+        duration
+            Duration, s; the shortest from rest to rest that the limits allow unless given.
+        blend
+            Share of the duration for accelerating, and again for braking, in (0, 0.5]; the one with the shortest
+            duration unless given.
+        limits
+            Limits that the motion keeps; the arm's own unless given, without those of torque where a link has no body.
+            A given duration is then held against the joints' ranges alone.
+        torques
+            Torques of a motion to use instead of the arm's, as for :func:`dhkit.trajectories.least_slowdown`.
+
+        Returns
+        -------
+        Trajectory
+            The motion.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, or rates without a duration.
+        PlanningError
+            A joint leaves its limits on the way, the duration is too short for the limits given, or no duration keeps
+            them.
 
         Examples
         --------
@@ -745,7 +1849,39 @@ class Arm:
         limits: Limits | None = None,
         torques: Torques | None = None,
     ) -> Trajectory:
-        """Return the cubic spline through configurations (m, n); see :func:`dhkit.trajectories.spline`."""
+        """Return the cubic spline through configurations, at rest at both ends.
+
+        Parameters
+        ----------
+        points
+            Configurations, shape (m, n), m >= 2, rad and m.
+        times
+            Times of the points, shape (m,), s, increasing; as short as the limits allow unless given.
+        limits
+            Limits that the motion keeps; the arm's own unless given, without those of torque where a link has no body.
+            A given duration is then held against the joints' ranges alone.
+        torques
+            Torques of a motion to use instead of the arm's, as for :func:`dhkit.trajectories.least_slowdown`.
+
+        Returns
+        -------
+        Trajectory
+            The motion, with continuous accelerations.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, values that are not finite, or rates without a duration.
+        PlanningError
+            A joint leaves its limits on the way, the duration is too short for the limits given, or no duration keeps
+            them.
+
+        Examples
+        --------
+        >>> motion = Arm.load("planar2r").spline([[0, 0], [0.5, 0.2], [1.0, 0.0]], times=[0, 1, 2])
+        >>> motion.q(1.0)
+        array([0.5, 0.2])
+        """
         from dhkit.trajectories import spline
 
         return spline(self._description, points, times, limits, torques)
@@ -759,7 +1895,45 @@ class Arm:
         limits: Limits | None = None,
         torques: Torques | None = None,
     ) -> Trajectory:
-        """Return the motion of the tool straight between two poses; see :func:`dhkit.trajectories.straight_line`."""
+        """Return the motion of the tool along the straight line between two poses.
+
+        The orientation turns evenly; the time law is s(t) = 10 t^3 - 15 t^4 + 6 t^5.
+
+        Parameters
+        ----------
+        T0, T1
+            Poses of the tool in the world, shape (4, 4), m.
+        q0
+            Joint values near which the motion begins, shape (n,), rad and m.
+        duration
+            Duration, s; the shortest that the limits allow unless given.
+        limits
+            Limits that the motion keeps; the arm's own unless given, without those of torque where a link has no body.
+            A given duration is then held against the joints' ranges alone.
+        torques
+            Torques of a motion to use instead of the arm's, as for :func:`dhkit.trajectories.least_slowdown`.
+
+        Returns
+        -------
+        Trajectory
+            The motion; velocity and acceleration are 0 at both ends.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, matrices that are not poses, or a duration that is not positive.
+        PlanningError
+            The workspace, a singularity or a joint limit is in the way, or no duration keeps the limits.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> T0, T1 = arm.fk([[0.2, 1.2], [0.8, 1.0]])
+        >>> motion = arm.straight_line(T0, T1, q0=[0.2, 1.2], duration=1.0)
+        >>> middle = arm.fk(motion.q(0.5))[:3, 3]
+        >>> bool(abs(middle - (T0[:3, 3] + T1[:3, 3]) / 2).max() < 1e-7)
+        True
+        """
         from dhkit.trajectories import straight_line
 
         return straight_line(self._description, T0, T1, q0, duration, limits, torques)
@@ -776,7 +1950,49 @@ class Arm:
         turning: bool = False,
         torques: Torques | None = None,
     ) -> Trajectory:
-        """Return the motion of the tool along a circle or an arc; see :func:`dhkit.trajectories.circle`."""
+        """Return the motion of the tool along a circle or an arc.
+
+        Parameters
+        ----------
+        T0
+            The first pose of the tool in the world, shape (4, 4), m.
+        centre
+            Centre of the circle, shape (3,), m, world.
+        axis
+            Direction of its axis, shape (3,), world.
+        angle
+            Angle of the arc, rad; a whole circle unless given.
+        q0
+            Joint values near which the motion begins, shape (n,), rad and m.
+        duration
+            Duration, s; the shortest that the limits allow unless given.
+        limits
+            Limits that the motion keeps; the arm's own unless given.
+        turning
+            Whether the tool turns with the arc; otherwise it keeps its orientation.
+        torques
+            Torques of a motion to use instead of the arm's, as for :func:`dhkit.trajectories.least_slowdown`.
+
+        Returns
+        -------
+        Trajectory
+            The motion.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, a matrix that is not a pose, or an axis without direction.
+        PlanningError
+            As for :meth:`straight_line`.
+
+        Examples
+        --------
+        >>> arm = Arm.load("puma560")
+        >>> T = arm.fk("nominal")
+        >>> motion = arm.circle(T, T[:3, 3] + [0, 0.05, 0], [1, 0, 0], q0="nominal", duration=2.0)
+        >>> bool(abs(arm.fk(motion.q(1.0))[:3, 3] - T[:3, 3] - [0, 0.1, 0]).max() < 1e-6)
+        True
+        """
         from dhkit.trajectories import circle
 
         return circle(
@@ -791,7 +2007,38 @@ class Arm:
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> Planner:
-        """Return a planner of optimal motions, to be used for many motions; see :class:`dhkit.planning.Planner`."""
+        """Return a planner of optimal motions, to be used for many motions.
+
+        Parameters
+        ----------
+        objective
+            ``"time"``, ``"effort"``, ``"energy"``, ``"jerk"``, a term such as ``Time()``, or a sum such as
+            ``Time() + 0.01 * Effort()``.
+        limits
+            Limits of position, velocity, acceleration, jerk and torque; the arm's own unless given.
+        constraints
+            Further constraints, such as ``ToolSpeed(0.5)``.
+        intervals
+            Number of intervals of the mesh; chosen by the arm and the objective unless given.
+        friction
+            Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
+
+        Returns
+        -------
+        Planner
+            Its :meth:`~dhkit.planning.Planner.solve` plans a motion.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument that is none of these.
+
+        Examples
+        --------
+        >>> planner = Arm.load("planar2r").planner("effort", intervals=16)
+        >>> planner.solve([0, 0], [1.0, 0.5], duration=1.0).report.certificate.ok
+        True
+        """
         from dhkit.planning import Planner
 
         return Planner(self._description, objective, limits, constraints, intervals, friction)
@@ -808,10 +2055,42 @@ class Arm:
         options: PlanOptions | None = None,
         **keywords: Unpack[PlanKeywords],
     ) -> Trajectory:
-        """Return the best motion between two configurations, or to a pose of the tool; planners are cached.
+        """Return the best motion between two configurations, or to a pose of the tool, certified.
 
-        Arguments are those of :class:`dhkit.planning.Planner` and of its :meth:`~dhkit.planning.Planner.solve`.
-        Unless options are given, the report compares the motion with classical ones.
+        Planners are cached: the second motion with the same objective and constraints needs no new program.
+
+        Parameters
+        ----------
+        start
+            Joint values (n,), rad and m, or the name of a configuration.
+        goal
+            The same, or a pose (4, 4) of the tool in the world, of which all branches of inverse kinematics are tried.
+        objective
+            ``"time"``, ``"effort"``, ``"energy"``, ``"jerk"``, a term such as ``Time()``, or a sum such as
+            ``Time() + 0.01 * Effort()``.
+        constraints
+            Further constraints, such as ``ToolSpeed(0.5)``.
+        intervals
+            Number of intervals of the mesh; chosen by the arm and the objective unless given.
+        friction
+            Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
+        options, **keywords
+            Fields of :class:`dhkit.PlanOptions`, as one value or one by one: ``via``, ``coordinates``, ``duration``,
+            ``start_velocity``, ``goal_velocity``, ``limits``, ``payload``, ``obstacles``, ``clearance``,
+            ``self_collision``, ``warm``, ``max_iterations``, ``time_limit``, ``progress``, ``compare``. Unless options
+            are given, the report compares the motion with classical ones.
+
+        Returns
+        -------
+        Trajectory
+            The motion; its ``report`` has the certificate, the active limits and the other branches' durations.
+
+        Raises
+        ------
+        PlanningError
+            There is no such motion, or none was found: says which limit or obstacle prevents it.
+        ValueError, TypeError
+            Arguments of another shape or type.
 
         Examples
         --------
@@ -856,7 +2135,47 @@ class Arm:
         options: PathOptions | None = None,
         **keywords: Unpack[PathKeywords],
     ) -> Trajectory:
-        """Return the best timing of a given path; see :func:`dhkit.planning.along_path`."""
+        """Return the best timing of a given path, from rest to rest.
+
+        See :func:`dhkit.planning.along_path`.
+
+        Parameters
+        ----------
+        path
+            A path without corners, such as one of :func:`dhkit.trajectories.joint_path`.
+        objective
+            ``"time"``, ``"effort"``, ``"energy"``, or a sum such as ``Time() + 0.01 * Effort()``.
+        constraints
+            Further constraints, such as ``ToolSpeed(0.5)``.
+        intervals
+            Initial number of intervals of the path's parameter.
+        friction
+            Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
+        options, **keywords
+            Fields of :class:`dhkit.PathOptions`, as one value or one by one: ``duration``, ``limits``, ``payload``,
+            ``obstacles``, ``clearance``, ``self_collision``, ``max_iterations``, ``time_limit``, ``progress``.
+
+        Returns
+        -------
+        Trajectory
+            The motion, which stays exactly on the path, with its certificate.
+
+        Raises
+        ------
+        PlanningError
+            No timing keeps the limits, or none was found.
+        ValueError, TypeError
+            Arguments of another shape or type.
+
+        Examples
+        --------
+        >>> from dhkit.trajectories import joint_path, tool_line
+        >>> arm = Arm.load("planar2r")
+        >>> line = tool_line(*arm.fk([[0.2, 1.2], [0.8, 1.0]]))
+        >>> motion = arm.plan_path(joint_path(arm, line, q0=[0.2, 1.2]), intervals=60)
+        >>> motion.report.certificate.ok
+        True
+        """
         from dhkit.planning import along_path
 
         return along_path(
@@ -882,7 +2201,48 @@ class Arm:
         self_collision: bool = False,
         independent: bool = False,
     ) -> Certificate:
-        """Check a motion against limits, the arm's own unless given; see :func:`dhkit.planning.certify`."""
+        """Check a motion against limits and obstacles, as planned motions are checked.
+
+        Parameters
+        ----------
+        motion
+            A motion of this arm.
+        limits
+            Limits of position, velocity, acceleration, jerk and torque; the arm's own unless given.
+        friction
+            Friction that the drives' torques include, False for none; the motion's own unless given.
+        payload
+            Payload of the tool; the motion's own unless given.
+        obstacles
+            Obstacles to stay clear of.
+        clearance
+            Least distance from them, m.
+        self_collision
+            Whether links keep the clearance from each other too.
+        independent
+            Whether a second check, which shares no code with the first, searches the motion for violations. It takes
+            0.05 to 1 s.
+
+        Returns
+        -------
+        Certificate
+            ``.ok``, and the largest use of each limit.
+
+        Raises
+        ------
+        DescriptionError
+            A motion of another robot, or limits of torques of an arm without bodies.
+        PlanningError
+            A clearance larger than the space in which the arm moves.
+        ModelError
+            Pinocchio or coal is needed and not installed.
+
+        Examples
+        --------
+        >>> arm = Arm.load("planar2r")
+        >>> arm.certify(arm.quintic([0, 0], [1.0, 0.5])).ok
+        True
+        """
         from dhkit.planning import certify
 
         return certify(
@@ -900,7 +2260,36 @@ class Arm:
     def distance(
         self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False
     ) -> Distances:
-        """Return the distances of the links from obstacles and from each other; see :func:`dhkit.planning.distance`."""
+        """Return the exact distances of the links' capsules from obstacles, and from each other.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        obstacles
+            Obstacles, of which at most one is a :class:`dhkit.Floor`.
+        self_collision
+            Whether distances between links are included.
+
+        Returns
+        -------
+        Distances
+            Least distances, shape (...), m, and the closest pair.
+
+        Raises
+        ------
+        ModelError
+            coal is not installed, or a mesh cannot be read.
+        ValueError, TypeError
+            Another shape of q, or of an obstacle.
+
+        Examples
+        --------
+        >>> import dhkit
+        >>> ball = dhkit.Obstacle.sphere(0.1, (0.4, 0.2, 0.9), name="ball")
+        >>> Arm.load("puma560").distance([0, 0, 0, 0, 0, 0], [ball]).pair
+        ('link 3', 'ball')
+        """
         from dhkit.planning import distance
 
         return distance(self._description, q, obstacles, self_collision)
@@ -918,9 +2307,37 @@ class Arm:
         explain: bool = True,
         **quantities: object,
     ) -> GradeReport:
-        """Judge a student's M, C, h, g, tau, K, V, L, A1 ... An, T, J; see :func:`dhkit.grading.grade_answers`.
+        """Judge a student's answers exactly: proved right, or wrong with the difference and the mistake.
 
-        Entries may be given one by one: ``M11=...``, ``g2=...``; with a rubric, verdicts become marks.
+        See :func:`dhkit.grading.grade_answers`.
+
+        Parameters
+        ----------
+        answers
+            Answers by quantity: M, C, h, g, tau, K, V, L, A1 ... An, T, J, and dh and ik as tables as on a sheet. An
+            answer is text, numbers, sympy or CasADi expressions, or a function.
+        names
+            How the student's names map on the robot's: ``{"q": ["th1", "th2"], "angles": "absolute"}``.
+        task
+            What was asked for, as on a sheet: ``{"friction": True}``.
+        rubric
+            Weights and penalties; verdicts become marks.
+        seed
+            Seed of the states at which wrong answers are shown; a fixed one unless given.
+        explain
+            Whether the mistake behind a wrong answer is looked for.
+        **quantities
+            Answers as keyword arguments, entries one by one too: ``M11=...``, ``g2=...``.
+
+        Returns
+        -------
+        GradeReport
+            Verdicts, differences, witnesses and diagnosis; prints as text.
+
+        Raises
+        ------
+        AnswerError
+            Answers that cannot be read.
 
         Examples
         --------
@@ -936,10 +2353,30 @@ class Arm:
         )
 
     def derive(self, symbols: Symbols = "file") -> Lagrangian:
-        """Return Lagrange's equations, exactly; see :func:`dhkit.symbolic.lagrangian`.
+        """Return Lagrange's equations of the arm, exactly.
 
-        ``symbols="none"`` has numbers, ``"file"`` the file's parameters, ``"inertial"`` a symbol for every inertial
-        parameter.
+        Parameters
+        ----------
+        symbols
+            Names that stay symbols: ``"none"``: all are numbers; ``"file"``: the parameters of the robot file;
+            ``"inertial"``: every inertial parameter, lengths and gravity.
+
+        Returns
+        -------
+        Lagrangian
+            Exact M, C, g, tau, K and V, which print as text, LaTeX and code.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError
+            Another choice of symbols.
+
+        Examples
+        --------
+        >>> print(Arm.load("planar2r").derive().text(("g",)).splitlines()[1])
+        g2 = m2*g*l2*c12/2
         """
         from dhkit.symbolic import lagrangian
 
@@ -958,7 +2395,25 @@ class Arm:
         return symbolic_kinematics(self._description)
 
     def base_parameters(self) -> BaseParameters:
-        """Return the fewest parameters that determine the torques; see :func:`dhkit.symbolic.base_parameters`."""
+        """Return the fewest parameters that determine the joint torques.
+
+        See :func:`dhkit.symbolic.base_parameters`.
+
+        Returns
+        -------
+        BaseParameters
+            Their number, and each as a combination of inertial parameters; rotors are included.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+
+        Examples
+        --------
+        >>> len(Arm.load("puma560").base_parameters())
+        40
+        """
         from dhkit.symbolic import base_parameters
 
         return base_parameters(self._description)
@@ -966,13 +2421,47 @@ class Arm:
     # URDF, Pinocchio, verification
 
     def urdf(self) -> str:
-        """Return the arm as URDF text, with meshes named ``meshes/...`` relative to it."""
+        """Return the arm as URDF text, with meshes named ``meshes/...`` relative to it.
+
+        Returns
+        -------
+        str
+            The text; every DH frame is a link ``dh0`` ... ``dhn``, the tool is ``tool``.
+
+        Examples
+        --------
+        >>> '<robot name="planar2r"' in Arm.load("planar2r").urdf()
+        True
+        """
         from dhkit.model import urdf_text
 
         return urdf_text(self._description)
 
     def write_urdf(self, path: str | Path, mesh_prefix: str | None = None) -> tuple[Path, ...]:
-        """Write the URDF and its meshes beside it; see :func:`dhkit.model.write_urdf`."""
+        """Write the arm's URDF, with its meshes beside it.
+
+        Parameters
+        ----------
+        path
+            The file; its folder is created.
+        mesh_prefix
+            Beginning of the meshes' names in the URDF instead of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
+
+        Returns
+        -------
+        tuple[Path, ...]
+            The files written, the URDF first.
+
+        Raises
+        ------
+        ModelError
+            A file cannot be written or read.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").write_urdf("planar2r.urdf")[0].name
+        'planar2r.urdf'
+        """
         from dhkit.model import write_urdf
 
         return write_urdf(self._description, path, mesh_prefix)
@@ -996,21 +2485,134 @@ class Arm:
         return self.pinocchio_model()
 
     def pinocchio_model(self) -> PinocchioModel:
-        """Return a new Pinocchio model of the arm; see :func:`dhkit.model.pinocchio_model`."""
+        """Return a new Pinocchio model of the arm, built from its URDF.
+
+        See :func:`dhkit.model.pinocchio_model`; :attr:`model` keeps one.
+
+        Returns
+        -------
+        pinocchio.Model
+            With gravity, armature, friction and limits set; joint i of the table is joint i of the model.
+
+        Raises
+        ------
+        ModelError
+            Pinocchio is not installed, or refuses the model.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").pinocchio_model().nq
+        2
+        """
         from dhkit.model import pinocchio_model
 
         return pinocchio_model(self._description)
 
     def verify(self, samples: int = 1000, seed: int = 0) -> VerificationReport:
-        """Compare dhkit's kinematics and dynamics with Pinocchio's at random states; ``.ok`` is true if they agree."""
+        """Compare dhkit's kinematics and dynamics with Pinocchio's at random states.
+
+        Pinocchio computes from the URDF that dhkit writes. See :func:`dhkit.verification.verify`.
+
+        Parameters
+        ----------
+        samples
+            Number of random states inside the limits.
+        seed
+            Their seed.
+
+        Returns
+        -------
+        VerificationReport
+            The worst error of each quantity, with its state; ``.ok`` is true if all agree.
+
+        Raises
+        ------
+        ModelError
+            Pinocchio is not installed, or refuses the model.
+        ValueError
+            ``samples`` is below 1.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").verify(samples=50).ok
+        True
+        """
         from dhkit.verification import verify
 
         return verify(self._description, samples, seed)
 
+    def report(
+        self,
+        folder: str | Path,
+        motion: Trajectory | str | Path | None = None,
+        run: SimulationResult | str | Path | None = None,
+        format: str = "pdf",
+    ) -> Report:
+        """Write the arm up as an article of at most 30 pages, with its programs beside it.
+
+        It has kinematics, inverse kinematics worked out, dynamics, verification, a motion and controllers; the
+        student's own text has empty places.
+
+        Parameters
+        ----------
+        folder
+            The folder, which is made if there is none.
+        motion
+            The motion that it shows, or its file; a quintic between two configurations unless given.
+        run
+            A simulation that it shows, or its file. One of this arm with locked joints stands for a simplified model,
+            whose equations are derived too.
+        format
+            ``"pdf"`` (needs the package typst), ``"html"`` or ``"tex"``.
+
+        Returns
+        -------
+        Report
+            The paths of the written files, and the number of pages of a PDF.
+
+        Raises
+        ------
+        ValueError
+            Another format.
+        DescriptionError
+            The folder is a file, or a motion or simulation cannot be read.
+        MissingPackageError
+            A PDF without the package typst.
+
+        Examples
+        --------
+        >>> Arm.load("planar2r").report("out/planar2r", format="html")  # doctest: +SKIP
+        <Report of out/planar2r/report.html: 4 files>
+        """
+        from dhkit.report import write_report
+
+        return write_report(self._description, folder, motion, run, format)
+
     # Viewer
 
     def view(self, *, frames: bool = False, port: int = 0, token: str | None = None) -> View:
-        """Return a view of the arm for a browser; see :class:`dhkit.viewer.View`."""
+        """Return a view of the arm for a browser, a page or a picture.
+
+        Parameters
+        ----------
+        frames
+            Whether the DH frames are drawn.
+        port
+            Port of the page on 127.0.0.1; a free one for 0.
+        token
+            Token of the page's address; a random one unless given.
+
+        Returns
+        -------
+        View
+            It shows states, motions and ghosts; ``.open()`` opens the browser, ``.save_html(...)`` writes a page.
+
+        Examples
+        --------
+        >>> with Arm.load("planar2r").view() as view:
+        ...     view.picture(size=(320, 240)).size
+        (320, 240)
+        """
         from dhkit.viewer import View
 
         return View(self._description, frames=frames, port=port, token=token)

@@ -177,13 +177,31 @@ class Adaptive:
         return Y @ self.estimate + known
 
     def initial_state(self, q: Array | None = None) -> Array:
-        """Return the estimate at the start, shape (m,), which does not depend on q."""
+        """Return the estimate at the start, shape (m,), which does not depend on q.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,), rad and m.
+        """
         return self._start.copy()
 
     def continuous(
         self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
     ) -> tuple[Array, Array]:
-        """Return the torques, shape (n,), and the rate of the estimate, shape (m,), at an estimate ``state`` (m,)."""
+        """Return the torques, shape (n,), and the rate of the estimate, shape (m,), at an estimate ``state`` (m,).
+
+        Parameters
+        ----------
+        t
+            Time, s.
+        q, qd
+            Joint values and rates, shape (n,), rad, m and per second.
+        setpoint
+            What the reference asks for at this time.
+        state
+            The controller's own state.
+        """
         Y, known, s = self._terms(q, qd, setpoint)
         return Y @ state + known, self.adaptation @ (Y.T @ s)
 

@@ -72,11 +72,23 @@ class BatchResult:
         return failed
 
     def arm(self, index: int) -> Description:
-        """Return the arm of one run."""
+        """Return the arm of one run.
+
+        Parameters
+        ----------
+        index
+            Number of the run, from 0.
+        """
         return self.arms[0] if len(self.arms) == 1 else self.arms[index]
 
     def audit(self, index: int) -> EnergyAudit:
-        """Return the energy balance of one run."""
+        """Return the energy balance of one run.
+
+        Parameters
+        ----------
+        index
+            Number of the run, from 0.
+        """
         arm = self.arm(index)
         q, qd = (
             np.stack([first[index], last[index]])
@@ -133,6 +145,11 @@ class BatchResult:
 
     def save(self, path: str | Path) -> Path:
         """Write the arrays as ``.npz``, for :func:`numpy.load`, and return the path.
+
+        Parameters
+        ----------
+        path
+            File that ends in ``.npz``.
 
         Raises
         ------

@@ -110,6 +110,11 @@ class Comparison:
     def table(self, style: str = "text") -> str:
         """Return the table as ``text``, ``markdown`` or ``latex``; torques are shares of the drives' limits.
 
+        Parameters
+        ----------
+        style
+            ``"text"``, ``"markdown"`` or ``"latex"``.
+
         Raises
         ------
         ValueError

@@ -28,12 +28,30 @@ class ContinuousController(Protocol):
     """A controller with internal states, such as integrals, which a continuous run integrates with those of the arm."""
 
     def initial_state(self, q: Array) -> Array:
-        """Return the internal states at time 0, shape (m,), for joint values q at the start, shape (n,), rad and m."""
+        """Return the internal states at time 0, shape (m,), for joint values q at the start, shape (n,), rad and m.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,), rad and m.
+        """
 
     def continuous(
         self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
     ) -> tuple[ArrayLike, Array]:
-        """Return the torques, shape (n,), N m and N, and the derivatives of the internal states, shape (m,)."""
+        """Return the torques, shape (n,), N m and N, and the derivatives of the internal states, shape (m,).
+
+        Parameters
+        ----------
+        t
+            Time, s.
+        q, qd
+            Joint values and rates, shape (n,), rad, m and per second.
+        setpoint
+            What the reference asks for at this time.
+        state
+            The controller's own state.
+        """
 
 
 Law: TypeAlias = Callable[[float, Array, Array, Setpoint, Array], tuple[Any, Array]]

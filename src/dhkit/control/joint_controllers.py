@@ -121,13 +121,31 @@ class PID:
         self._time: float | None = None
 
     def initial_state(self, q: Array) -> Array:
-        """Return zeros for the integrals of the errors, rad s and m s, shape (n,), with filtered rates (2n,)."""
+        """Return zeros for the integrals of the errors, rad s and m s, shape (n,), with filtered rates (2n,).
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,), rad and m.
+        """
         return np.zeros(len(q) * (1 if self.cutoff is None else 2))
 
     def continuous(
         self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
     ) -> tuple[Array, Array]:
-        """Return the torques, shape (n,), N m and N, and the derivatives of ``state``, of the same shape."""
+        """Return the torques, shape (n,), N m and N, and the derivatives of ``state``, of the same shape.
+
+        Parameters
+        ----------
+        t
+            Time, s.
+        q, qd
+            Joint values and rates, shape (n,), rad, m and per second.
+        setpoint
+            What the reference asks for at this time.
+        state
+            The controller's own state.
+        """
         n = len(q)
         error = setpoint.q - q
         rate = (setpoint.qd if self.derivative == "error" else 0.0) - qd

@@ -93,7 +93,24 @@ class ComputedTorque(_Proportional):
 
     @classmethod
     def tuned(cls, robot: Robot, bandwidth: ArrayLike = 20.0, damping: ArrayLike = 1.0) -> Self:
-        """Return the controller with kp = w^2, kd = 2 z w for bandwidth w, rad/s, and damping z: numbers, or (B,)."""
+        """Return the controller with kp = w^2, kd = 2 z w for bandwidth w, rad/s, and damping z: numbers, or (B,).
+
+        Parameters
+        ----------
+        robot
+            The robot, or arm, that the controller knows.
+        bandwidth
+            Bandwidth w, rad/s.
+        damping
+            Damping ratio z.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> controller = ComputedTorque.tuned(Arm.load("planar2r"), bandwidth=10.0)
+        >>> float(controller.kp), float(controller.kd)
+        (100.0, 20.0)
+        """
         return cls(robot, *pd_gains(bandwidth, damping))
 
     def law(self) -> Law:
@@ -211,13 +228,31 @@ class FrictionCompensation:
         reset(self.inner)
 
     def initial_state(self, q: Array) -> Array:
-        """Return the inner controller's internal states at time 0, shape (m,)."""
+        """Return the inner controller's internal states at time 0, shape (m,).
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,), rad and m.
+        """
         return continuous_law(self.inner, q)[0]
 
     def continuous(
         self, t: float, q: Array, qd: Array, setpoint: Setpoint, state: Array
     ) -> tuple[Array, Array]:
-        """Return the torques, shape (n,), N m and N, and the derivatives of the inner states, shape (m,)."""
+        """Return the torques, shape (n,), N m and N, and the derivatives of the inner states, shape (m,).
+
+        Parameters
+        ----------
+        t
+            Time, s.
+        q, qd
+            Joint values and rates, shape (n,), rad, m and per second.
+        setpoint
+            What the reference asks for at this time.
+        state
+            The controller's own state.
+        """
         tau, change = continuous_law(self.inner, q)[1](t, q, qd, setpoint, state)
         return np.asarray(tau, dtype=float) + self._friction(setpoint), change
 

@@ -158,6 +158,11 @@ class Plant:
         """Return the accelerations of a state under net torques, shape (n,), rad/s^2 and m/s^2.
 
         Net torques are those of the drives and pushes, minus friction.
+
+        Parameters
+        ----------
+        q, qd, tau
+            Joint values, rates and torques, shape (n,), rad, m, seconds, N m and N.
         """
         qdd: Array = np.empty((1, self.n))
         run, parameters = self._single
@@ -285,11 +290,23 @@ class Plant:
         return after
 
     def kinetic_energy(self, q: Array, qd: Array) -> float:
-        """Return the kinetic energy with the drives' rotors, J; q and qd of shape (n,)."""
+        """Return the kinetic energy with the drives' rotors, J; q and qd of shape (n,).
+
+        Parameters
+        ----------
+        q, qd
+            Joint values and rates, shape (n,), rad, m and per second.
+        """
         return float(kinetic_energy(self.description, q, qd))
 
     def energy(self, q: Array, qd: Array) -> float:
-        """Return kinetic plus potential energy, J; q and qd of shape (n,)."""
+        """Return kinetic plus potential energy, J; q and qd of shape (n,).
+
+        Parameters
+        ----------
+        q, qd
+            Joint values and rates, shape (n,), rad, m and per second.
+        """
         return self.kinetic_energy(q, qd) + float(potential_energy(self.description, q))
 
     def __repr__(self) -> str:

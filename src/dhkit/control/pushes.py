@@ -56,7 +56,15 @@ class Push:
             )
 
     def torque(self, description: Description, q: Array) -> Array:
-        """Return the joint torques of the push at joint values q (n,), shape (n,), N m and N."""
+        """Return the joint torques of the push at joint values q (n,), shape (n,), N m and N.
+
+        Parameters
+        ----------
+        description
+            The arm.
+        q
+            Joint values, shape (n,), rad and m.
+        """
         n = description.n
         if self.link is not None and self.link > n:
             raise ValueError(f"link is {self.link}; {description.name} has {n}")

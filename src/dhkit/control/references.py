@@ -64,7 +64,13 @@ class Reference(Protocol):
         """Duration, s; None if it has no end."""
 
     def sampled(self, t: Array) -> Samples:
-        """Return joint values, rates and accelerations at times (N,), s: shape (N, n) each, rad, m and seconds."""
+        """Return joint values, rates and accelerations at times (N,), s: shape (N, n) each, rad, m and seconds.
+
+        Parameters
+        ----------
+        t
+            Times, shape (N,), s.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +81,13 @@ class Held:
     duration: float | None = None
 
     def sampled(self, t: Array) -> Samples:
-        """Return the configuration at times (N,), shape (N, n), and zero rates and accelerations."""
+        """Return the configuration at times (N,), shape (N, n), and zero rates and accelerations.
+
+        Parameters
+        ----------
+        t
+            Times, shape (N,), s.
+        """
         still = np.zeros((len(t), len(self.q)))
         return still + self.q, still, still.copy()
 
@@ -101,7 +113,13 @@ class Step:
         return (float(self.time),)
 
     def sampled(self, t: Array) -> Samples:
-        """Return the configurations at times (N,), shape (N, n), and zero rates and accelerations."""
+        """Return the configurations at times (N,), shape (N, n), and zero rates and accelerations.
+
+        Parameters
+        ----------
+        t
+            Times, shape (N,), s.
+        """
         q = np.where((t >= self.time)[:, None], np.asarray(self.after), np.asarray(self.before))
         return q, np.zeros_like(q), np.zeros_like(q)
 
@@ -124,7 +142,13 @@ class Sine:
         _make_finite(self, "centre", "amplitude", "frequency", "phase")
 
     def sampled(self, t: Array) -> Samples:
-        """Return joint values, rates and accelerations at times (N,), shape (N, n) each."""
+        """Return joint values, rates and accelerations at times (N,), shape (N, n) each.
+
+        Parameters
+        ----------
+        t
+            Times, shape (N,), s.
+        """
         # q = c + A sin(w t + phi),    qd = A w cos(w t + phi),    qdd = -A w^2 sin(w t + phi),    w = 2 pi frequency.
         centre = np.asarray(self.centre)
         rate = 2 * np.pi * np.broadcast_to(np.asarray(self.frequency), centre.shape)

@@ -170,13 +170,27 @@ class SimulationResult:
         return _norms(self.tool_rotation_error)
 
     def save(self, path: str | Path) -> Path:
-        """Write a file by its suffix and return its path; see :func:`dhkit.control.result_files.save_result`."""
+        """Write a file by its suffix and return its path; see :func:`dhkit.control.result_files.save_result`.
+
+        Parameters
+        ----------
+        path
+            File that ends in ``.npz``, ``.mat`` or ``.csv``.
+        """
         saved: Path = format_function("save_result")(self, path)
         return saved
 
     @classmethod
     def load(cls, path: str | Path, robot: Robot | None = None) -> SimulationResult:
-        """Read a file of :meth:`save`; see :func:`dhkit.control.result_files.load_result`. A robot may be an arm."""
+        """Read a file of :meth:`save`; see :func:`dhkit.control.result_files.load_result`. A robot may be an arm.
+
+        Parameters
+        ----------
+        path
+            File of :meth:`save`.
+        robot
+            Robot, or arm, of the run; the one that the file holds unless given.
+        """
         result: SimulationResult = format_function("load_result")(
             path, None if robot is None else description_of(robot)
         )

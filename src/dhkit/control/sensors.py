@@ -60,6 +60,13 @@ class Sensors:
     def start(self, n: int, period: float) -> Measuring:
         """Start the measurement of one run of an arm with n joints, at samples ``period`` (s) apart.
 
+        Parameters
+        ----------
+        n
+            Number of joints.
+        period
+            Time between two samples, s.
+
         Raises
         ------
         ValueError

@@ -116,7 +116,13 @@ class ToolPoses:
         return np.asarray(self.times, dtype=float)
 
     def sampled(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return joint values, rates and accelerations at times (N,), shape (N, n) each."""
+        """Return joint values, rates and accelerations at times (N,), shape (N, n) each.
+
+        Parameters
+        ----------
+        t
+            Times, shape (N,), s.
+        """
         q = np.zeros((len(t), len(self._first))) + self._first
         qd = np.zeros_like(q)
         qdd = np.zeros_like(q)

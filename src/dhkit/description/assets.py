@@ -17,10 +17,20 @@ _CHECKOUT = _PACKAGE.parents[1]
 def asset(name: str) -> Path:
     """Return the path of a packaged file or folder, such as ``urdf/puma560.urdf`` or ``meshes``.
 
+    Parameters
+    ----------
+    name
+        Path below the package's folder of assets.
+
     Raises
     ------
     DescriptionError
         The package has no such file.
+
+    Examples
+    --------
+    >>> asset("urdf/puma560.urdf").name
+    'puma560.urdf'
     """
     if name.split("/")[0] in ("urdf", "meshes") and ".." not in PurePosixPath(name).parts:
         for root in (_PACKAGE, _CHECKOUT):

@@ -43,13 +43,29 @@ _ASYMMETRY_TOLERANCE = 1e-12
 
 @takes_robot
 def with_tool(description: Description, T: ArrayLike) -> Description:
-    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), m, instead of its own."""
+    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), m, instead of its own.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    T
+        Pose of the tool in DH frame n, shape (4, 4), m.
+    """
     return replace(description, tool=Tool(placement_of_pose(T, "tool"), description.tool.shapes))
 
 
 @takes_robot
 def with_base(description: Description, T: ArrayLike) -> Description:
-    """Return the arm with frame 0 at T in the world, shape (4, 4), m, instead of its own base."""
+    """Return the arm with frame 0 at T in the world, shape (4, 4), m, instead of its own base.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    T
+        Pose of frame 0 in the world, shape (4, 4), m.
+    """
     base = description.base
     return replace(description, base=Base(placement_of_pose(T, "base"), base.shapes, base.body))
 
@@ -58,10 +74,23 @@ def with_base(description: Description, T: ArrayLike) -> Description:
 def with_parameters(description: Description, /, **values: Quantity) -> Description:
     """Return the arm with other values of its parameters, SI and radians.
 
+    Parameters
+    ----------
+    description
+        The arm.
+    **values
+        Values by name; text may name other parameters.
+
     Raises
     ------
     DescriptionError
         It has no such parameter, or the values make no robot.
+
+    Examples
+    --------
+    >>> from dhkit.description.library import library_robot
+    >>> float(with_parameters(library_robot("planar2r"), l1=0.6).numbers.a[0])
+    0.6
     """
     known = description.parameters
     for name in values:

@@ -76,6 +76,15 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     that is not a regular file, such as ``/dev/stdout`` or a named pipe, is written to directly, since a renamed file
     would replace it.
 
+    Parameters
+    ----------
+    path
+        File to write.
+    content
+        Text or bytes.
+    private
+        Whether only this user may read the file.
+
     Raises
     ------
     OSError

@@ -82,6 +82,15 @@ def configuration(description: Description, name: str, argument: str = "q") -> A
 def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Array:
     """Return the joint values of one state, shape (n,), rad and m, all finite.
 
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (n,), or the name of a configuration.
+    name
+        Name of the argument in messages.
+
     Raises
     ------
     ValueError

@@ -31,10 +31,20 @@ def robots() -> tuple[str, ...]:
 def library_robot(name: str) -> Description:
     """Return a robot of the library.
 
+    Parameters
+    ----------
+    name
+        Name, one of :func:`robots`.
+
     Raises
     ------
     DescriptionError
         No robot of that name; names the nearest.
+
+    Examples
+    --------
+    >>> library_robot("puma560").n
+    6
     """
     if name not in robots():
         close = difflib.get_close_matches(name.lower(), robots(), n=1, cutoff=0.5)

@@ -85,7 +85,13 @@ class Payload:
 
     @classmethod
     def of_numbers(cls, numbers: Array) -> Payload:
-        """Return the payload of ten :attr:`numbers`."""
+        """Return the payload of ten :attr:`numbers`.
+
+        Parameters
+        ----------
+        numbers
+            The ten numbers, shape (10,).
+        """
         if numbers.shape != (10,):
             raise DescriptionError(f"payload: numbers has shape {numbers.shape}; expected (10,)")
         tensor = np.zeros((3, 3))

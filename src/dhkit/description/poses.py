@@ -109,10 +109,20 @@ def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tu
 def pose_quaternion(T: ArrayLike) -> Array:
     """Return the unit quaternions (x, y, z, w) with w >= 0, shape (..., 4), of poses, shape (..., 4, 4), m.
 
+    Parameters
+    ----------
+    T
+        Poses, shape (..., 4, 4), m.
+
     Raises
     ------
     ValueError
         Another shape, a matrix that is not a rigid transform, or NaN.
+
+    Examples
+    --------
+    >>> pose_quaternion(pose((0, 0, 0), euler=(0, 0, 180), degrees=True)).round(12) + 0.0
+    array([0., 0., 1., 0.])
     """
     from scipy.spatial.transform import Rotation
 
@@ -124,10 +134,22 @@ def pose_quaternion(T: ArrayLike) -> Array:
 def check_pose(T: ArrayLike, name: str = "T") -> Array:
     """Return T as an array of poses, shape (..., 4, 4), m; NaN passes: it stands for a pose that is not known.
 
+    Parameters
+    ----------
+    T
+        Poses, shape (..., 4, 4), m.
+    name
+        Name of the argument in messages.
+
     Raises
     ------
     ValueError
         Not of shape (..., 4, 4), or some matrix is not a rigid transform within 2e-6.
+
+    Examples
+    --------
+    >>> check_pose([[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).shape
+    (4, 4)
     """
     array = number_array(T, name, "(..., 4, 4)")
     if array.shape[-2:] != (4, 4):

@@ -133,6 +133,11 @@ def takes_robot(
 def description_of(robot: Robot) -> Description:
     """Return the description of an arm, or itself.
 
+    Parameters
+    ----------
+    robot
+        Description, or an arm.
+
     Raises
     ------
     TypeError

@@ -53,6 +53,11 @@ if TYPE_CHECKING:
 def read_robot(path: str | Path) -> Description:
     """Read a robot file.
 
+    Parameters
+    ----------
+    path
+        Robot file, which ends in ``.toml``.
+
     Raises
     ------
     DescriptionError
@@ -72,10 +77,26 @@ def from_toml(
 ) -> Description:
     """Read a robot file's text; ``file`` names it in messages, mesh paths are relative to ``mesh_folder``.
 
+    Parameters
+    ----------
+    text
+        Text of a robot file.
+    file
+        Name of the file in messages.
+    mesh_folder
+        Folder that mesh paths are relative to.
+
     Raises
     ------
     DescriptionError
         See :func:`read_robot`.
+
+    Examples
+    --------
+    >>> from dhkit.description.library import library_robot
+    >>> arm = from_toml(to_toml(library_robot("planar2r")))
+    >>> arm.n
+    2
     """
     from dhkit.description.schema import validated
 
@@ -101,7 +122,15 @@ def to_toml(description: Description) -> str:
 
 @takes_robot
 def write_robot(description: Description, path: str | Path) -> None:
-    """Write a robot file, whole or not at all."""
+    """Write a robot file, whole or not at all.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    path
+        File to write.
+    """
     write_atomically(Path(path), toml_text(description))
 
 

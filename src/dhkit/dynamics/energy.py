@@ -49,6 +49,29 @@ def potential_energy(
     """Return the potential energy of the moving links in gravity, shape (...), J; arguments as for ``mass_matrix``.
 
     It is 0 for a mass at the world's origin: V = -sum(m g . c).
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    out
+        Array that receives the result, float64, C-contiguous; a new array unless given.
+    threads
+        Number of threads that share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (...), J.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> float(potential_energy(arm, [0, 0]))
+    0.0
     """
     return evaluate("potential_energy", description, {"q": q}, (), out, threads)
 
@@ -59,10 +82,26 @@ def power(
 ) -> Array:
     """Return the mechanical power of the joints, qd . tau, shape (...), W; qd and tau (..., n) broadcast.
 
+    Parameters
+    ----------
+    description
+        The arm.
+    qd, tau
+        Joint rates and torques, shape (..., n), rad/s, m/s, N m and N.
+    out
+        Array that receives the result, float64, C-contiguous; a new array unless given.
+
     Raises
     ------
     ValueError, TypeError
         An argument of another shape, or not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> float(power(arm, [1.0, 2.0], [3.0, 0.5]))
+    4.0
     """
     rates = joint_array(description, qd, "qd")
     torques = joint_array(description, tau, "tau")

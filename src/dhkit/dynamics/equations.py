@@ -75,7 +75,31 @@ def coriolis_matrix(
 def gravity_torque(
     description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
 ) -> Array:
-    """Return g(q), shape (..., n), N m and N: torques that hold the arm; arguments as for :func:`mass_matrix`."""
+    """Return g(q), shape (..., n), N m and N: torques that hold the arm; arguments as for :func:`mass_matrix`.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    out
+        Array that receives the result, float64, C-contiguous; a new array unless given.
+    threads
+        Number of threads that share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (..., n), N m and N.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> gravity_torque(arm, [0, 0]).round(3)
+    array([15.206,  2.943])
+    """
     return evaluate("gravity_torque", description, {"q": q}, (description.n,), out, threads)
 
 
@@ -87,7 +111,31 @@ def bias(
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Return C(q, qd) qd + g(q), shape (..., n), N m and N; arguments as for :func:`coriolis_matrix`."""
+    """Return C(q, qd) qd + g(q), shape (..., n), N m and N; arguments as for :func:`coriolis_matrix`.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q, qd
+        Joint values and rates, shape (..., n), rad, m and per second.
+    out
+        Array that receives the result, float64, C-contiguous; a new array unless given.
+    threads
+        Number of threads that share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (..., n), N m and N.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> bias(arm, [0, 0], [0, 0]).round(3)
+    array([15.206,  2.943])
+    """
     return evaluate("bias", description, {"q": q, "qd": qd}, (description.n,), out, threads)
 
 

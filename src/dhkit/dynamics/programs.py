@@ -91,7 +91,15 @@ def dynamics_kernel(quantity: str, description: Description) -> tuple[Kernel, Ar
 
 
 def dynamics_graph(quantity: str, description: Description) -> Graph:
-    """Return the program of a quantity, parametric in the arm's numbers."""
+    """Return the program of a quantity, parametric in the arm's numbers.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    quantity
+        Name of the quantity, such as ``"inverse_dynamics"``.
+    """
     table, parameters = InertialTable.parametric(description)
     symbols = {name: joint_symbols(name, description.n) for name in _STATES[quantity]}
     expression = _EXPRESSIONS[quantity](table, *symbols.values())

@@ -131,7 +131,13 @@ class Expression:
 
     @classmethod
     def symbol(cls, name: str) -> Expression:
-        """Return a parameter by its name."""
+        """Return a parameter by its name.
+
+        Parameters
+        ----------
+        name
+            Name of the symbol.
+        """
         return cls.of_atom(Atom(name))
 
     @classmethod
@@ -239,7 +245,13 @@ class Expression:
         return replace(self, written=text)
 
     def with_digits(self, digits: int) -> Expression:
-        """Return the value with longer coefficients rounded to this number of digits."""
+        """Return the value with longer coefficients rounded to this number of digits.
+
+        Parameters
+        ----------
+        digits
+            Number of significant digits.
+        """
         limit = 10**digits
         context = Context(prec=digits)
 

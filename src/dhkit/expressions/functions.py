@@ -20,7 +20,13 @@ _LARGEST_FACTORED = 10**6
 
 
 def sqrt(x: Expression) -> Expression:
-    """Return the square root; that of a perfect square is rational."""
+    """Return the square root; that of a perfect square is rational.
+
+    Parameters
+    ----------
+    x
+        Exact value.
+    """
     number = x.rational
     if number is None:
         return Expression.of_atom(Atom("sqrt", (x,)))
@@ -40,7 +46,13 @@ def sqrt(x: Expression) -> Expression:
 
 
 def sin(x: Expression) -> Expression:
-    """Return the sine of an angle in radians."""
+    """Return the sine of an angle in radians.
+
+    Parameters
+    ----------
+    x
+        Exact value.
+    """
     steps = _steps(x)
     if steps is not None:
         return _sine_of_steps(steps)
@@ -50,7 +62,13 @@ def sin(x: Expression) -> Expression:
 
 
 def cos(x: Expression) -> Expression:
-    """Return the cosine of an angle in radians."""
+    """Return the cosine of an angle in radians.
+
+    Parameters
+    ----------
+    x
+        Exact value.
+    """
     steps = _steps(x)
     if steps is not None:
         return _sine_of_steps(steps + STEPS_IN_PI // 2)
@@ -73,7 +91,13 @@ def tan(x: Expression) -> Expression:
 
 
 def arc_tangent(y: Expression, x: Expression) -> Expression:
-    """Return atan2(y, x); exact if it is a multiple of 15 degrees of two numbers."""
+    """Return atan2(y, x); exact if it is a multiple of 15 degrees of two numbers.
+
+    Parameters
+    ----------
+    y, x
+        Exact values, in proportion to sine and cosine.
+    """
     if y.symbols or x.symbols:
         return Expression.of_atom(Atom("atan2", (y, x)))
     angle = math.atan2(float(y), float(x))
@@ -139,7 +163,15 @@ def call(function: str, *arguments: Expression) -> Expression:
 
 
 def substitute(expression: Expression, values: Mapping[str, Expression]) -> Expression:
-    """Return the expression with parameters replaced by their values; parameters without value stay."""
+    """Return the expression with parameters replaced by their values; parameters without value stay.
+
+    Parameters
+    ----------
+    expression
+        Expression.
+    values
+        Values by name.
+    """
     if values.keys().isdisjoint(expression.symbols):
         return expression
     total = ZERO

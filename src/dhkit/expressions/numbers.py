@@ -15,6 +15,11 @@ from dhkit.expressions.syntax import decimal_fraction
 def exact(value: object) -> Expression:
     """Return a number as the exact value that was typed: 0.1 is 1/10, not the nearest double.
 
+    Parameters
+    ----------
+    value
+        Number or text.
+
     Raises
     ------
     ExpressionError

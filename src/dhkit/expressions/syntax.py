@@ -96,6 +96,11 @@ Tree: TypeAlias = Number | Name | Call | Power | Product | Sum
 def read(text: str) -> Tree:
     """Read an expression's syntax tree.
 
+    Parameters
+    ----------
+    text
+        Formula, such as ``"l1 + 3*mm"``.
+
     Raises
     ------
     ExpressionError

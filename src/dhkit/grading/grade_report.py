@@ -364,7 +364,13 @@ class GradeReport:
         return tuple(dict.fromkeys(entry.quantity for entry in self.entries))
 
     def of(self, quantity: str) -> tuple[Entry, ...]:
-        """Return the entries of a quantity."""
+        """Return the entries of a quantity.
+
+        Parameters
+        ----------
+        quantity
+            Quantity, such as ``"M"``.
+        """
         return tuple(entry for entry in self.entries if entry.quantity == quantity)
 
     def data(self) -> dict[str, object]:

@@ -71,6 +71,13 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     """Return the points of a judged sheet; a sheet that could not be judged gets 0.
 
     Sums are exact until they become floats, so that a sheet without errors gets all points and not nearly all.
+
+    Parameters
+    ----------
+    report
+        Report on a sheet.
+    rubric
+        Weights and penalties.
     """
     if report.error or not report.entries:
         return Marks(0.0, rubric.points)

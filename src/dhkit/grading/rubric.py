@@ -86,6 +86,11 @@ class Rubric:
     def read(cls, path: str | Path) -> Rubric:
         """Return the rubric of a TOML file.
 
+        Parameters
+        ----------
+        path
+            Rubric file, which ends in ``.toml``.
+
         Raises
         ------
         AnswerError

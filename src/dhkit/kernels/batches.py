@@ -20,7 +20,7 @@ def fill(
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Return a kernel's results, shape (..., *tail), for states of shape (..., n).
+    """Return a kernel's results, ``(..., *tail)``, for states of shape (..., n).
 
     Parameters
     ----------

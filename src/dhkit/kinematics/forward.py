@@ -46,7 +46,31 @@ def forward_kinematics(
 def frames(
     description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
 ) -> Array:
-    """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4); arguments as for :func:`forward_kinematics`."""
+    """Return DH frames 0 ... n in the world, shape (..., n+1, 4, 4); arguments as for :func:`forward_kinematics`.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    out
+        Array that receives the result, float64, C-contiguous; a new array unless given.
+    threads
+        Number of threads that share a large batch.
+
+    Returns
+    -------
+    Array
+        Shape (..., n+1, 4, 4), m.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> frames(arm, [0, 0])[:, 0, 3]
+    array([0. , 0.5, 0.9])
+    """
     run, parameters = frames_kernel(description)
     return fill(
         run, parameters, [joint_array(description, q)], (description.n + 1, 4, 4), out, threads

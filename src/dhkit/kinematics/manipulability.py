@@ -99,10 +99,27 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
     Arguments are those of :func:`manipulability`. The smallest singular value that counts is that of the arm's
     :func:`freedoms` (Salisbury and Craig, Articulated Hands, 1982); an arm with none has 0.
 
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    motion
+        Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``, which
+        mixes m and rad.
+
     Returns
     -------
     Array
         Shape (...), from 0 to 1; NaN where q is.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> float(isotropy(arm, [0.2, 0.0]).round(6))                      # stretched
+    0.0
     """
     rank = freedoms(description, motion)
     sigma = singular_values(description, q, motion)
@@ -119,7 +136,30 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
 def condition_number(
     description: Description, q: ArrayLike, motion: Motion = "translational"
 ) -> Array:
-    """Return the ratio of the largest to the smallest singular value, infinite where singular; see :func:`isotropy`."""
+    """Return the ratio of the largest to the smallest singular value, infinite where singular; see :func:`isotropy`.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    motion
+        Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``, which
+        mixes m and rad.
+
+    Returns
+    -------
+    Array
+        Shape (...), 1 at least.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> bool(condition_number(arm, [0.2, 0.0]) > 1e15)                 # stretched
+    True
+    """
     with np.errstate(divide="ignore"):
         return 1.0 / isotropy(description, q, motion)
 
@@ -132,10 +172,27 @@ def singular_values(
 
     Arguments are those of :func:`manipulability`.
 
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    motion
+        Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``, which
+        mixes m and rad.
+
     Returns
     -------
     Array
         Shape (..., min(n, 3)), or (..., min(n, 6)) for the whole motion; NaN where q is.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> singular_values(arm, [0.2, 1.0]).shape
+    (2,)
     """
     J, missing = _known(_rows(description, q, motion))
     sigma = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=float)
@@ -146,6 +203,14 @@ def singular_values(
 @takes_robot
 def freedoms(description: Description, motion: Motion = "translational") -> int:
     """Return the number of independent directions in which the tool can move: the generic rank of the Jacobian.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    motion
+        Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``, which
+        mixes m and rad.
 
     Examples
     --------
@@ -210,6 +275,28 @@ def force_ellipsoid(
     It has the axes of the :func:`velocity_ellipsoid` and reciprocal lengths: where the tool moves fast it holds
     little (Yoshikawa 1985, section 6). A direction without motion is held by the structure: its length is infinite.
     Arguments are those of :func:`velocity_ellipsoid`.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+    motion
+        Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``, which
+        mixes m and rad.
+
+    Returns
+    -------
+    Ellipsoid
+        Axes and lengths, N or N m for unit torques.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> force_ellipsoid(arm, [0.2, 1.0]).lengths.shape
+    (3,)
     """
     velocity = velocity_ellipsoid(description, q, motion)
     with np.errstate(divide="ignore"):

@@ -164,6 +164,13 @@ def determinant(description: Description, q: ArrayLike) -> Array:
     J is the Jacobian, or for an arm of fewer than six joints ``task @ jacobian(description, q, "tool")``: see
     :attr:`Singularities.task`. SI; raises as :func:`measures` does.
 
+    Parameters
+    ----------
+    description
+        The arm.
+    q
+        Joint values, shape (..., n), rad and m.
+
     Examples
     --------
     >>> from dhkit.description import library_robot

@@ -184,6 +184,15 @@ class IKSolutions:
         """Return joint values (..., n), rad and m, with whole turns added to bring each angle nearest to ``near``.
 
         With limits, as near as they allow; angles that no winding brings inside them stay outside.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m.
+        near
+            Joint values to come near to, shape (..., n).
+        limits
+            Whether angles stay inside the joint limits.
         """
         # q + 2 pi k with k the whole number nearest to (near - q) / (2 pi), and lower <= q + 2 pi k <= upper.
         with np.errstate(invalid="ignore"):
@@ -199,10 +208,23 @@ class IKSolutions:
 
         Joints without limits stay as they are.
 
+        Parameters
+        ----------
+        branch
+            Name of the branch.
+
         Raises
         ------
         ValueError
             A batch of poses, or no such branch.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("puma560")
+        >>> solutions = arm.ik(arm.fk("nominal"))
+        >>> len(solutions.windings("left up no-flip"))
+        1
         """
         if self.distance.shape != ():
             raise ValueError(
@@ -215,10 +237,24 @@ class IKSolutions:
     def require(self, near: ArrayLike | None = None) -> Array:
         """Return one solution inside the limits for each pose, shape (..., n), rad and m, the nearest to ``near``.
 
+        Parameters
+        ----------
+        near
+            Joint values to come near to, shape (n,) or (..., n), rad and m; the middle of the limits unless
+            given.
+
         Raises
         ------
         UnreachableError
             Some pose has none: says which, and why.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("puma560")
+        >>> q = arm.ik(arm.fk("nominal")).require(near=arm.configurations["nominal"])
+        >>> bool(abs(q - arm.configurations["nominal"]).max() < 1e-9)
+        True
         """
         at = self._near(near)
         chosen = self._closest(self.within_limits(at), at, self.allowed)

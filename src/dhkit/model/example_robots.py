@@ -81,6 +81,11 @@ def example_robots() -> dict[str, Path]:
 def example_urdf(name: str) -> Path:
     """Return the URDF of an example robot.
 
+    Parameters
+    ----------
+    name
+        Name of a robot of example-robot-data.
+
     Raises
     ------
     ModelError

@@ -60,6 +60,11 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     ``# products = +integral`` above it. Of SolidWorks' text the block "Taken at the center of mass and aligned with
     the output coordinate system" is read.
 
+    Parameters
+    ----------
+    path
+        Report of a CAD program as text, or a CSV file.
+
     Raises
     ------
     ModelError

@@ -52,6 +52,13 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
 
     Meshes are written first, so that no robot file is left that names missing ones.
 
+    Parameters
+    ----------
+    description
+        The robot.
+    path
+        Robot file to write, which ends in ``.toml``.
+
     Raises
     ------
     ModelError

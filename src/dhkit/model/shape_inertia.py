@@ -38,7 +38,13 @@ class MassProperties:
     """Shape (3, 3), kg m^2, about the centre of mass; products with the tensor's sign, xy = -integral of x y dm."""
 
     def moved(self, T: ArrayLike) -> MassProperties:
-        """Return the properties in another frame; T, shape (4, 4), m, takes points of their own frame to it."""
+        """Return the properties in another frame; T, shape (4, 4), m, takes points of their own frame to it.
+
+        Parameters
+        ----------
+        T
+            Pose of the present frame in the new one, shape (4, 4), m.
+        """
         # c' = R c + p,  I' = R I R^T, without a Steiner term: I is about the centre of mass, which moves with the body.
         matrix = np.asarray(T, dtype=float)
         R = matrix[:3, :3]

@@ -83,6 +83,11 @@ class TriangleMesh:
         """Return the mesh with its coordinates times one factor or three, shape () or (3,).
 
         The outside stays outside when factors mirror the mesh. Factors may convert a file's unit to m.
+
+        Parameters
+        ----------
+        scale
+            Factor of all lengths.
         """
         factors = np.broadcast_to(np.asarray(scale, dtype=float), (3,))
         is_mirrored = bool(np.prod(np.sign(factors)) < 0)
@@ -90,7 +95,13 @@ class TriangleMesh:
         return replace(self, vertices=self.vertices * factors, faces=faces)
 
     def moved(self, T: ArrayLike) -> TriangleMesh:
-        """Return the mesh in the frame that a rigid transform T, shape (4, 4), m, maps its own frame to."""
+        """Return the mesh in the frame that a rigid transform T, shape (4, 4), m, maps its own frame to.
+
+        Parameters
+        ----------
+        T
+            Pose of the present frame in the new one, shape (4, 4), m.
+        """
         matrix = np.asarray(T, dtype=float)
         return replace(self, vertices=self.vertices @ matrix[:3, :3].T + matrix[:3, 3])
 

@@ -106,6 +106,11 @@ class Program:
     def fk(self, q: Array) -> Array:
         """Return the program's pose of the tool, shape (4, 4), m, at joint values, shape (n,), rad and m.
 
+        Parameters
+        ----------
+        q
+            Joint values, shape (n,), rad and m.
+
         Raises
         ------
         ProgramError
@@ -120,6 +125,13 @@ class Program:
 
     def ik(self, T: Array, n: int) -> Array:
         """Return the program's solutions, shape (B, n), rad and m, of a pose, shape (4, 4), m; rows may have NaN.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in the world, shape (4, 4), m.
+        n
+            Number of joints.
 
         Raises
         ------

@@ -100,6 +100,11 @@ class CheckRubric:
     def read(cls, path: str | Path) -> CheckRubric:
         """Read a rubric: a TOML file with tables ``[fk]``, ``[ik]`` and ``[controller]``.
 
+        Parameters
+        ----------
+        path
+            Rubric file, which ends in ``.toml``.
+
         Raises
         ------
         AnswerError

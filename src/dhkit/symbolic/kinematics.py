@@ -47,7 +47,20 @@ class SymbolicMatrix:
         return self.elements[place]
 
     def evaluate(self, q: ArrayLike) -> Array:
-        """Return its values at joint positions (..., n), rad and m: shape (..., 4, 4) or (..., 6, n)."""
+        """Return its values at joint positions (..., n), rad and m: shape (..., 4, 4) or (..., 6, n).
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> float(arm.symbolic.T.evaluate([0.0, 0.0])[0, 3])
+        0.9
+        """
         return self.kinematics.arm.evaluate(self.elements, q)
 
     def text(self) -> str:
@@ -63,7 +76,13 @@ class SymbolicMatrix:
         return self.kinematics.sympy(self.name)[self.name]
 
     def code(self, language: str = "python") -> str:
-        """Return a function that computes it, in ``"python"``, ``"c"`` or ``"matlab"``."""
+        """Return a function that computes it, in ``"python"``, ``"c"`` or ``"matlab"``.
+
+        Parameters
+        ----------
+        language
+            ``"python"``, ``"c"`` or ``"matlab"``.
+        """
         return self.kinematics.code(self.name, language)
 
     def __str__(self) -> str:
@@ -130,10 +149,22 @@ class SymbolicKinematics:
     def A(self, i: int) -> SymbolicMatrix:
         """Return the transform of link i, from 1: frame i in frame i - 1, m.
 
+        Parameters
+        ----------
+        i
+            Number of the link, from 1.
+
         Raises
         ------
         ValueError
             No such link.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> print(arm.symbolic.A(2).text().splitlines()[0])
+        A2_11 = c2
         """
         if i not in range(1, self.n + 1):
             raise ValueError(f"A({i!r}): expected a link from 1 to {self.n}")
@@ -163,29 +194,60 @@ class SymbolicKinematics:
         return inverse_derivation(self.description)
 
     def matrix(self, name: str) -> SymbolicMatrix:
-        """Return one of A1 ... An, T and J by its name."""
+        """Return one of A1 ... An, T and J by its name.
+
+        Parameters
+        ----------
+        name
+            ``"A1"`` ... ``"An"``, ``"T"`` or ``"J"``.
+        """
         return SymbolicMatrix(name, self.elements(name), self)
 
     # Reading
 
     def text(self, what: str | Sequence[str] = ("A", "T")) -> str:
-        """Return some of A (all links), A1 ... An, T and J as text."""
+        """Return some of A (all links), A1 ... An, T and J as text.
+
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"A1"`` ... ``"An"``, ``"T"``, ``"J"``.
+        """
         quantities = format_function("kinematic_quantities")(self, what)
         return str(format_function("equations_text")(quantities))
 
     def latex(self, what: str | Sequence[str] = ("A", "T")) -> str:
-        """Return some of A, A1 ... An, T and J in LaTeX, for a page that loads amsmath."""
+        """Return some of A, A1 ... An, T and J in LaTeX, for a page that loads amsmath.
+
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"A1"`` ... ``"An"``, ``"T"``, ``"J"``.
+        """
         quantities = format_function("kinematic_quantities")(self, what)
         return str(format_function("equations_latex")(quantities))
 
     def sympy(self, what: str | Sequence[str] = ("A", "T", "J")) -> dict[str, object]:
-        """Return sympy matrices by name, not simplified."""
+        """Return sympy matrices by name, not simplified.
+
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"A1"`` ... ``"An"``, ``"T"``, ``"J"``.
+        """
         quantities = format_function("kinematic_quantities")(self, what)
         matrices: dict[str, object] = format_function("equations_sympy")(quantities)
         return matrices
 
     def code(self, what: str | Sequence[str] = ("T", "J"), language: str = "python") -> str:
         """Return functions that compute some of A, A1 ... An, T and J, in ``"python"``, ``"c"`` or ``"matlab"``.
+
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"A1"`` ... ``"An"``, ``"T"``, ``"J"``.
+        language
+            ``"python"``, ``"c"`` or ``"matlab"``.
 
         Raises
         ------
@@ -205,6 +267,11 @@ class SymbolicKinematics:
 
     def elements(self, name: str) -> Elements:
         """Return a quantity's entries by its name, as an array of elements.
+
+        Parameters
+        ----------
+        name
+            ``"A1"`` ... ``"An"``, ``"T"`` or ``"J"``.
 
         Raises
         ------
@@ -230,5 +297,13 @@ class SymbolicKinematics:
 
 @takes_robot
 def symbolic_kinematics(description: Description, symbols: Symbols = "file") -> SymbolicKinematics:
-    """Return an arm's exact kinematics; see :func:`dhkit.symbolic.exact_arm` for ``symbols``."""
+    """Return an arm's exact kinematics; see :func:`dhkit.symbolic.exact_arm` for ``symbols``.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    symbols
+        ``"none"``, ``"file"`` or ``"inertial"``: names that stay symbols.
+    """
     return SymbolicKinematics(description, derive_kinematics(description, symbols=symbols))

@@ -135,6 +135,11 @@ def load_trajectory(path: str | Path, description: Description | None = None) ->
 def written_by_dhkit(path: str | Path) -> str:
     """Return the kind of a file that dhkit wrote, such as ``dhkit trajectory``; empty for files of other programs.
 
+    Parameters
+    ----------
+    path
+        File.
+
     Raises
     ------
     DescriptionError

@@ -98,6 +98,21 @@ class Limits:
 
         Descriptions limit neither acceleration nor jerk.
 
+        Parameters
+        ----------
+        description
+            The robot, or an arm.
+        velocity
+            Largest speeds, rad/s and m/s.
+        acceleration
+            Largest accelerations, rad/s^2 and m/s^2.
+        jerk
+            Largest jerks, rad/s^3 and m/s^3.
+        torque
+            Largest torques and forces, N m and N.
+        lower, upper
+            Lowest and highest joint values, rad and m.
+
         Raises
         ------
         ValueError
@@ -144,10 +159,22 @@ class Limits:
     ) -> Limits:
         """Return the limits times factors; those of position stay.
 
+        Parameters
+        ----------
+        velocity, acceleration, jerk, torque
+            Factors.
+
         Raises
         ------
         ValueError
             A share that is not positive.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> limits = Arm.load("puma560").limits
+        >>> bool((limits.scaled(velocity=0.5).velocity == 0.5 * limits.velocity).all())
+        True
         """
         return replace(
             self,

@@ -64,6 +64,13 @@ class JointPath:
     def straight(cls, description: Description, q0: ArrayLike, q1: ArrayLike) -> JointPath:
         """Return the straight line between two configurations, shape (n,), rad and m.
 
+        Parameters
+        ----------
+        description
+            The arm.
+        q0, q1
+            Start and goal, shape (n,), rad and m.
+
         Raises
         ------
         ValueError
@@ -82,15 +89,33 @@ class JointPath:
         return cls(description, np.array([0.0, 1.0]), np.stack([start, goal - start])[None])
 
     def q(self, s: ArrayLike) -> Array:
-        """Return joint values, shape (..., n), rad and m, for s of shape (...)."""
+        """Return joint values, shape (..., n), rad and m, for s of shape (...).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (...), from 0 to 1.
+        """
         return self.pieces(s)
 
     def qs(self, s: ArrayLike) -> Array:
-        """Return the first derivatives by s, shape (..., n)."""
+        """Return the first derivatives by s, shape (..., n).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (...), from 0 to 1.
+        """
         return self.pieces.derivative(s)
 
     def qss(self, s: ArrayLike) -> Array:
-        """Return the second derivatives by s, shape (..., n)."""
+        """Return the second derivatives by s, shape (..., n).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (...), from 0 to 1.
+        """
         return self.pieces.derivative.derivative(s)
 
     def timed(self, breaks: ArrayLike, coefficients: ArrayLike) -> Trajectory:

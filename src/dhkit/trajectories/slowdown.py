@@ -161,6 +161,13 @@ def least_slowdowns(
 def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     """Check that a motion stays inside the joint limits.
 
+    Parameters
+    ----------
+    trajectory
+        The motion.
+    limits
+        Limits whose joint ranges are kept.
+
     Raises
     ------
     PlanningError

@@ -18,13 +18,31 @@ class ToolPath(Protocol):
     """Poses of the tool over s in [0, 1]."""
 
     def poses(self, s: Array) -> Array:
-        """Return T_world_tool, shape (N, 4, 4), for s of shape (N,)."""
+        """Return T_world_tool, shape (N, 4, 4), for s of shape (N,).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
 
     def twists(self, s: Array) -> Array:
-        """Return derivatives by s, shape (N, 6), world axes: of the tool's origin, m, and angular, rad."""
+        """Return derivatives by s, shape (N, 6), world axes: of the tool's origin, m, and angular, rad.
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
 
     def twist_rates(self, s: Array) -> Array:
-        """Return the derivatives of the twists by s, shape (N, 6), m and rad."""
+        """Return the derivatives of the twists by s, shape (N, 6), m and rad.
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,16 +57,34 @@ class ToolLine:
     """Rotation vector from the first to the last pose, world axes, shape (3,), rad."""
 
     def poses(self, s: Array) -> Array:
-        """Return poses, shape (N, 4, 4)."""
+        """Return poses, shape (N, 4, 4).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
         # p(s) = p_0 + s way,  R(s) = exp(s [turn]x) R_0
         return _poses(self.T0[:3, 3] + s[:, None] * self.way, s[:, None] * self.turn, self.T0)
 
     def twists(self, s: Array) -> Array:
-        """Return the same twist everywhere, shape (N, 6)."""
+        """Return the same twist everywhere, shape (N, 6).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
         return np.tile(np.concatenate([self.way, self.turn]), (len(s), 1))
 
     def twist_rates(self, s: Array) -> Array:
-        """Return zeros, shape (N, 6)."""
+        """Return zeros, shape (N, 6).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
         return np.zeros((len(s), 6))
 
     def __repr__(self) -> str:
@@ -71,21 +107,39 @@ class ToolCircle:
     """Whether the tool turns with the arc; else its orientation stays."""
 
     def poses(self, s: Array) -> Array:
-        """Return poses, shape (N, 4, 4)."""
+        """Return poses, shape (N, 4, 4).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
         # p(s) = centre + exp(s [turn]x) (p_0 - centre)
         turn = s[:, None] * self.turn
         tool_turn = turn if self.turning else 0.0 * turn
         return _poses(self.centre + self._radii(s), tool_turn, self.T0)
 
     def twists(self, s: Array) -> Array:
-        """Return twists, shape (N, 6)."""
+        """Return twists, shape (N, 6).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
         # v = w x r, with w the turn per unit of s
         velocity: Array = np.cross(self.turn, self._radii(s))
         angular = np.broadcast_to(self.turn * self.turning, velocity.shape)
         return np.asarray(np.concatenate([velocity, angular], axis=1))
 
     def twist_rates(self, s: Array) -> Array:
-        """Return the derivatives of the twists, which point towards the axis, shape (N, 6)."""
+        """Return the derivatives of the twists, which point towards the axis, shape (N, 6).
+
+        Parameters
+        ----------
+        s
+            Places on the path, shape (N,), from 0 to 1.
+        """
         # dv/ds = w x (w x r)
         acceleration = np.cross(self.turn, np.cross(self.turn, self._radii(s)))
         return np.asarray(np.concatenate([acceleration, np.zeros_like(acceleration)], axis=1))

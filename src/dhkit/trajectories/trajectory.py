@@ -132,15 +132,60 @@ class Trajectory:
         return self.pieces(np.clip(t, 0.0, self.duration), side)
 
     def qd(self, t: ArrayLike, side: Side = "right") -> Array:
-        """Return joint rates, shape (..., n), as :meth:`q`: 0 before 0 and after the duration."""
+        """Return joint rates, shape (..., n), as :meth:`q`: 0 before 0 and after the duration.
+
+        Parameters
+        ----------
+        t
+            Times, shape (...), s.
+        side
+            Side of a jump whose value is returned: ``"right"`` or ``"left"``.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.qd(1.0)
+        array([0.375, 0.75 ])
+        """
         return self._derivative(t, 1, side)
 
     def qdd(self, t: ArrayLike, side: Side = "right") -> Array:
-        """Return joint accelerations, shape (..., n), as :meth:`qd`."""
+        """Return joint accelerations, shape (..., n), as :meth:`qd`.
+
+        Parameters
+        ----------
+        t
+            Times, shape (...), s.
+        side
+            Side of a jump whose value is returned: ``"right"`` or ``"left"``.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.qdd(1.0)
+        array([0., 0.])
+        """
         return self._derivative(t, 2, side)
 
     def jerk(self, t: ArrayLike, side: Side = "right") -> Array:
-        """Return the derivatives of the accelerations, shape (..., n), as :meth:`qd`."""
+        """Return the derivatives of the accelerations, shape (..., n), as :meth:`qd`.
+
+        Parameters
+        ----------
+        t
+            Times, shape (...), s.
+        side
+            Side of a jump whose value is returned: ``"right"`` or ``"left"``.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.jerk(1.0)
+        array([-0.75, -1.5 ])
+        """
         return self._derivative(t, 3, side)
 
     def tau(
@@ -175,7 +220,23 @@ class Trajectory:
     def carrying(
         self, payload: Payload | None = None, friction: bool | Friction | None = None
     ) -> Trajectory:
-        """Return the same motion with another payload and friction, none unless given; without the report."""
+        """Return the same motion with another payload and friction, none unless given; without the report.
+
+        Parameters
+        ----------
+        payload
+            Payload of the tool.
+        friction
+            Friction that the drives' torques include.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> from dhkit import Payload
+        >>> motion.carrying(Payload(0.5)).payload.mass
+        0.5
+        """
         return replace(self, report=None, payload=payload, friction=Friction.chosen(friction))
 
     def _derivative(self, t: ArrayLike, order: int, side: Side) -> Array:
@@ -204,7 +265,22 @@ class Trajectory:
         return Samples(self.description, times, *values, self.payload, self.friction)
 
     def sample_times(self, rate: float | None = None, n: int | None = None) -> Array:
-        """Return the times of :meth:`sample`, shape (N,), s."""
+        """Return the times of :meth:`sample`, shape (N,), s.
+
+        Parameters
+        ----------
+        rate
+            Samples a second, Hz.
+        n
+            Number of samples, instead of a rate.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.sample_times(n=5)
+        array([0. , 0.5, 1. , 1.5, 2. ])
+        """
         if (rate is None) == (n is None):
             raise ValueError(f"sample: found rate={rate!r} and n={n!r}; expected one of them")
         if n is not None:
@@ -223,10 +299,22 @@ class Trajectory:
     def slowed(self, c: float) -> Trajectory:
         """Return the same path c times as slow, q(t / c), without the report.
 
+        Parameters
+        ----------
+        c
+            Factor of the duration; below 1 the motion is faster.
+
         Raises
         ------
         ValueError
             c is not from 1e-12 to 1e12.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.slowed(2.0).duration, motion.slowed(2.0).qd(2.0)
+        (4.0, array([0.1875, 0.375 ]))
         """
         if not isinstance(c, Real) or not 1 / _MAX_SLOWDOWN <= c <= _MAX_SLOWDOWN:
             raise ValueError(f"c is {c!r}; expected a number from 1e-12 to 1e12")
@@ -247,6 +335,11 @@ class Trajectory:
     def then(self, other: Trajectory) -> Trajectory:
         """Return this motion followed by another.
 
+        Parameters
+        ----------
+        other
+            Motion that begins where this one ends.
+
         Raises
         ------
         DescriptionError
@@ -254,6 +347,14 @@ class Trajectory:
         ValueError
             The other does not begin where this one ends, to 1e-9 rad or m; names the joint. Or it has another payload
             or friction; see :meth:`carrying`.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> there = arm.cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> there.then(arm.cubic([0.5, 1.0], [0, 0], duration=1.0)).duration
+        3.0
         """
         other.require(self.description)
         for what, own, theirs in (
@@ -335,13 +436,45 @@ class Trajectory:
     # Files
 
     def save(self, path: str | Path, rate: float | None = None) -> Path:
-        """Write a file by its suffix and return its path; see :func:`dhkit.trajectories.files.save_trajectory`."""
+        """Write a file by its suffix and return its path; see :func:`dhkit.trajectories.files.save_trajectory`.
+
+        Parameters
+        ----------
+        path
+            File; ``.npz`` and ``.mat`` keep the motion without loss, ``.csv`` samples, ``.yaml`` is ROS 2's
+            ``JointTrajectory``.
+        rate
+            Samples a second of files of samples, Hz; 1000 unless given.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> motion.save("motion.npz").name
+        'motion.npz'
+        """
         saved: Path = format_function("save_trajectory")(self, path, rate)
         return saved
 
     @classmethod
     def load(cls, path: str | Path, robot: Robot | None = None) -> Trajectory:
-        """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`. A robot may be an arm."""
+        """Read a file of :meth:`save`; see :func:`dhkit.trajectories.files.load_trajectory`. A robot may be an arm.
+
+        Parameters
+        ----------
+        path
+            File of :meth:`save`, ``.npz`` or ``.mat``.
+        robot
+            Robot, or arm, of the motion; the one that the file holds unless given. The file is refused on
+            another robot.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> motion = Arm.load("planar2r").cubic([0, 0], [0.5, 1.0], duration=2.0)
+        >>> Trajectory.load(motion.save("motion.npz")) == motion
+        True
+        """
         motion: Trajectory = format_function("load_trajectory")(
             path, None if robot is None else description_of(robot)
         )
@@ -355,7 +488,19 @@ class Trajectory:
         degrees: bool = False,
         columns: Mapping[str, str] | None = None,
     ) -> Trajectory:
-        """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`. A robot may be an arm."""
+        """Read samples from elsewhere; see :func:`dhkit.trajectories.files.read_samples`. A robot may be an arm.
+
+        Parameters
+        ----------
+        path
+            File of samples with a header.
+        robot
+            Robot, or arm, that moves.
+        degrees
+            Whether angles are in degrees.
+        columns
+            Names of the file's columns, by the names that dhkit gives them.
+        """
         read_samples = format_function("read_samples")
         motion: Trajectory = read_samples(
             path, description_of(robot), degrees=degrees, columns=columns

@@ -33,6 +33,15 @@ class JointStates(NamedTuple):
 def random_states(description: Description, samples: int, seed: int = 0) -> Array:
     """Return random joint values, shape (samples, n): full turns, and strokes inside limits (without limits 1 m).
 
+    Parameters
+    ----------
+    description
+        The robot.
+    samples
+        Number of states.
+    seed
+        Seed of the random numbers.
+
     Raises
     ------
     ValueError
@@ -53,6 +62,15 @@ def random_motions(description: Description, samples: int, seed: int = 0) -> Joi
     """Return random states inside the limits of position and speed, with accelerations up to 10 rad/s^2 or m/s^2.
 
     Joints without limits make full turns or a metre, at 3 rad/s or m/s.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    samples
+        Number of states.
+    seed
+        Seed of the random numbers.
 
     Raises
     ------

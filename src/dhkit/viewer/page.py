@@ -107,7 +107,7 @@ _CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascr
 
 SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
-    "img-src data: blob:; connect-src 'self'"
+    "img-src data: blob:; font-src 'self'; connect-src 'self'"
 )
 """Policy of the live page: it loads nothing from other hosts. meshcat's bundle writes style elements."""
 
@@ -160,6 +160,8 @@ def page_files() -> dict[str, tuple[str, bytes]]:
         for name in names
     }
     files[""] = files.pop("index.html")
+    font = (resources.files("dhkit") / "fonts" / "math.woff2").read_bytes()
+    files["lab/math.woff2"] = ("font/woff2", font)
     files["meshcat.js"] = ("text/javascript; charset=utf-8", meshcat_bundle())
     return files
 

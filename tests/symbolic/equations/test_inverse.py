@@ -277,6 +277,15 @@ def test_sympys_solutions_satisfy_sympys_equations(name):
     assert checked >= 2
 
 
+def test_formulas_in_sentences_are_typeset():
+    """Every name of a letter and an index is in mathematics, and every absolute value and root."""
+    page = inverse_derivation(library_robot("puma560")).html()
+    words = re.sub(
+        r"<math.*?</math>|<svg.*?</svg>|<style.*?</style>|<table.*?</table>", "", page, flags=re.S
+    )
+    assert not re.findall(r"\b(?:theta\w*|p[xyz]|a[xyz]|[ad]\d|s\d+|c\d+)\b|abs\(|sqrt\(", words)
+
+
 @pytest.mark.parametrize("name", WORKED_OUT)
 def test_the_pages_in_docs_are_fresh(name):
     path = Path(__file__).resolve().parents[3] / "docs" / f"ik-{name}.md"

@@ -107,7 +107,13 @@ class Certificate:
         )
 
     def excess_of(self, limit: int) -> float:
-        """Return the largest excess of a constraint, by its place, as a share of the limit; -inf without it."""
+        """Return the largest excess of a constraint, by its place, as a share of the limit; -inf without it.
+
+        Parameters
+        ----------
+        limit
+            Place of the constraint, from 0.
+        """
         return max((check.excess for check in self.checks if check.limit == limit), default=-np.inf)
 
     @property

@@ -75,17 +75,39 @@ class Constraint:
         return True
 
     def use_text(self, use: float) -> str:
-        """Return a use of the limit (1 at the limit) as text."""
+        """Return a use of the limit (1 at the limit) as text.
+
+        Parameters
+        ----------
+        use
+            Value over the limit.
+        """
         return f"{100 * use:.4g} % of its limit"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit, 1 at the limit."""
+        """Return the limited expressions, k x 1, without unit, 1 at the limit.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         raise NotImplementedError(
             f"{type(self).__name__} has no method rows, the expressions for the optimizer"
         )
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
+        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit.
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         raise NotImplementedError(
             f"{type(self).__name__} has no method measured, the numbers for the certificate"
         )
@@ -146,13 +168,19 @@ class Constraint:
         return 0
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return the parameters of a motion that starts at the tool's pose ``T_start`` (4, 4), shape (size,)."""
+        """Return the parameters of a motion that starts at the tool's pose ``T_start`` (4, 4), shape (size,).
+
+        Parameters
+        ----------
+        T_start
+            Pose of the tool at the start, shape (4, 4), m.
+        """
         return np.zeros(0)
 
 
 @dataclass(frozen=True)
 class MotorPower(Constraint):
-    """Limit of the mechanical power |tau qd| of each joint, W."""
+    """Limit of the mechanical power abs(tau qd) of each joint, W."""
 
     watts: float | tuple[float, ...]
     two_sided = True
@@ -167,11 +195,27 @@ class MotorPower(Constraint):
         return "motor power"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         return point.tau * point.qd / _each(self.watts, point.n)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
+        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit.
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         return states.tau * states.qd / _each(self.watts, states.n)
 
     __repr__ = value_line
@@ -198,12 +242,28 @@ class TorqueSpeedLine(Constraint):
         return "torque-speed line"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         n = point.n
         return point.tau / _each(self.stall_torque, n) + point.qd / _each(self.no_load_speed, n)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit."""
+        """Return the limited quantity at samples, shape (N, k), without unit, 1 at the limit.
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         n = states.n
         measured: Array = states.tau / _each(self.stall_torque, n) + states.qd / _each(
             self.no_load_speed, n
@@ -337,7 +397,7 @@ def joint_limits(limits: Limits) -> tuple[Constraint, ...]:
 
 @dataclass(frozen=True)
 class ToolSpeed(Constraint):
-    """Limit of the speed of the tool's origin, m/s: |v|^2 / limit^2 <= 1, which has a derivative at v = 0."""
+    """Limit of the speed of the tool's origin, m/s: ``|v|^2 / limit^2 <= 1``, which has a derivative at v = 0."""
 
     limit: float
 
@@ -350,20 +410,36 @@ class ToolSpeed(Constraint):
         return "tool speed"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         import casadi
 
         return casadi.sumsqr(point.tool_velocity) / self.limit**2
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k).
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         square: Array = np.sum(states.tool_velocity**2, axis=1, keepdims=True)
         return square / self.limit**2
 
 
 @dataclass(frozen=True)
 class ToolAcceleration(Constraint):
-    """Limit of the acceleration of the tool's origin, m/s^2: |a|^2 / limit^2 <= 1."""
+    """Limit of the acceleration of the tool's origin, m/s^2: ``|a|^2 / limit^2 <= 1``."""
 
     limit: float
 
@@ -376,13 +452,29 @@ class ToolAcceleration(Constraint):
         return "tool acceleration"
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         import casadi
 
         return casadi.sumsqr(point.tool_acceleration) / self.limit**2
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k).
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         square: Array = np.sum(states.tool_acceleration**2, axis=1, keepdims=True)
         return square / self.limit**2
 
@@ -414,7 +506,13 @@ class ToolDirection(Constraint):
         return "tool direction"
 
     def use_text(self, use: float) -> str:
-        """Return a use of the limit as text."""
+        """Return a use of the limit as text.
+
+        Parameters
+        ----------
+        use
+            Value over the limit.
+        """
         return _angle_use_text(use, self.tolerance)
 
     def size(self, description: Description) -> int:
@@ -422,14 +520,28 @@ class ToolDirection(Constraint):
         return 3
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return the direction in the world, shape (3,), without unit."""
+        """Return the direction in the world, shape (3,), without unit.
+
+        Parameters
+        ----------
+        T_start
+            Pose of the tool at the start, shape (4, 4), m.
+        """
         if self.direction is not None:
             return np.array(self.direction)
         at_start: Array = T_start[:3, :3] @ np.array(self.axis)
         return at_start
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         import casadi
 
         axis = point.T_world_tool[:3, :3] @ casadi.DM(self.axis)
@@ -437,7 +549,15 @@ class ToolDirection(Constraint):
         return share
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k).
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         cosine = (states.T_world_tool[:, :3, :3] @ np.array(self.axis)) @ parameters
         return np.asarray(_share_of_angle(cosine, self.tolerance))[:, None]
 
@@ -465,7 +585,13 @@ class ToolOrientation(Constraint):
         return "tool orientation"
 
     def use_text(self, use: float) -> str:
-        """Return a use of the limit as text."""
+        """Return a use of the limit as text.
+
+        Parameters
+        ----------
+        use
+            Value over the limit.
+        """
         return _angle_use_text(use, self.tolerance)
 
     def size(self, description: Description) -> int:
@@ -473,11 +599,25 @@ class ToolOrientation(Constraint):
         return 9
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return the orientation at the start, column by column, shape (9,), without unit."""
+        """Return the orientation at the start, column by column, shape (9,), without unit.
+
+        Parameters
+        ----------
+        T_start
+            Pose of the tool at the start, shape (4, 4), m.
+        """
         return T_start[:3, :3].ravel(order="F")
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
-        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
+        """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        parameters
+            Values of the constraint, in CasADi expressions.
+        """
         import casadi
 
         trace = casadi.dot(casadi.vec(point.T_world_tool[:3, :3]), parameters)
@@ -485,7 +625,15 @@ class ToolOrientation(Constraint):
         return share
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return the limited quantity at samples, shape (N, k)."""
+        """Return the limited quantity at samples, shape (N, k).
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states, with the tool's velocities.
+        parameters
+            Values of the constraint.
+        """
         trace = np.einsum(
             "kij,ij->k", states.T_world_tool[:, :3, :3], parameters.reshape(3, 3, order="F")
         )

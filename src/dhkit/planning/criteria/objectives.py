@@ -98,7 +98,13 @@ class Time(Term):
         return False
 
     def measured(self, states: States) -> Array:
-        """Return ones, shape (N,)."""
+        """Return ones, shape (N,).
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states.
+        """
         return np.ones(len(states.times))
 
 
@@ -121,13 +127,25 @@ class Effort(Term):
         return _each("Effort", "joint weights", self.joint_weights or 1.0, n)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return the sum of weight tau^2, 1 x 1, N^2 m^2."""
+        """Return the sum of weight tau^2, 1 x 1, N^2 m^2.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        """
         import casadi
 
         return casadi.dot(self._weights(point.n), point.tau**2)
 
     def measured(self, states: States) -> Array:
-        """Return the sum of weight tau^2, shape (N,), N^2 m^2."""
+        """Return the sum of weight tau^2, shape (N,), N^2 m^2.
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states.
+        """
         squares: Array = states.tau**2 @ self._weights(states.n)
         return squares
 
@@ -144,7 +162,13 @@ class Jerk(Term):
     units = ("rad²/s⁵", "m²/s⁵")
 
     def measured(self, states: States) -> Array:
-        """Return the sum of the squared jerks, shape (N,)."""
+        """Return the sum of the squared jerks, shape (N,).
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states.
+        """
         squares: Array = np.sum(states.jerk**2, axis=1)
         return squares
 
@@ -193,6 +217,11 @@ class Energy(Term):
         and the ends are given. Fed back, P therefore costs as much as D. If not, the sum of the positive parts P+ of
         the joints' powers costs as much as P+ + (D - P) / 2, since P+ = (P + abs P) / 2 and abs P = 2 P+ - P. With P or
         P+ alone, the optimizer would find motions for which the quadrature is inaccurate.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
         """
         import casadi
 
@@ -216,13 +245,25 @@ class Energy(Term):
         return total
 
     def positive_parts(self, point: Point) -> casadi.SX:
-        """Return the joints' power, n x 1, W, or nothing if negative power is fed back."""
+        """Return the joints' power, n x 1, W, or nothing if negative power is fed back.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        """
         import casadi
 
         return casadi.SX(0, 1) if self.regenerates else point.tau * point.qd
 
     def measured(self, states: States) -> Array:
-        """Return the electrical power, shape (N,), W."""
+        """Return the electrical power, shape (N,), W.
+
+        Parameters
+        ----------
+        states
+            Joint values, rates, accelerations and torques of N states.
+        """
         # P_i = tau_i qd_i, or its positive part, and in the winding (tau_i / (gear_i k_i))^2.
         power = states.tau * states.qd
         if not self.regenerates:
@@ -343,14 +384,26 @@ class Objective:
         return sum(term.weight for term in self.terms if term.is_jerk)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return the sum of the integrands that are functions of the state, 1 x 1."""
+        """Return the sum of the integrands that are functions of the state, 1 x 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        """
         import casadi
 
         each = [term.weight * term.integrand(point) for term in self.terms if term.has_integrand]
         return sum(each, casadi.SX(0))
 
     def positive_parts(self, point: Point) -> casadi.SX:
-        """Return all terms' quantities whose positive parts are added to the integrand, k x 1."""
+        """Return all terms' quantities whose positive parts are added to the integrand, k x 1.
+
+        Parameters
+        ----------
+        point
+            Joint values, rates, accelerations and torques at one point, in CasADi expressions.
+        """
         import casadi
 
         each = [

@@ -85,7 +85,24 @@ class CasadiFunctions:
     def layered(
         self, friction: bool | Friction | None = None, payload: bool = False, wrench: bool = False
     ) -> CasadiFunctions:
-        """Return the same arm's functions with these layers, and no others; see the class."""
+        """Return the same arm's functions with these layers, and no others; see the class.
+
+        Parameters
+        ----------
+        friction
+            Model of friction to include.
+        payload
+            Whether mass, centre of mass and inertia of a payload are inputs.
+        wrench
+            Whether a wrench on the tool is an input.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> arm.casadi.layered(payload=True).inverse_dynamics.name_in()[3:]
+        ['payload_mass', 'payload_com', 'payload_inertia']
+        """
         return CasadiFunctions(self._description, friction, payload, wrench)
 
     # Kinematics

@@ -33,7 +33,15 @@ _Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 
 
 def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return M with drives, n x n, kg m^2, kg m and kg, by composite rigid bodies (Walker & Orin 1982, method 3)."""
+    """Return M with drives, n x n, kg m^2, kg m and kg, by composite rigid bodies (Walker & Orin 1982, method 3).
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    """
     frames = equation_frames(table, q)
     M: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
     for j, composite in _composites(frames):
@@ -53,6 +61,15 @@ def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX)
     C_ij is the integral over all mass of J_i . dJ_j/dt, where J_j(r) is the velocity of a point at r per unit rate of
     joint j. The part that depends on the velocities V of the links that a joint carries is summed over them as two
     integrals over mass, of V and of r V^T: 12 numbers, where the Coriolis inertia of Echeandia & Wensing 2021 has 36.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd
+        Joint rates, n x 1.
     """
     frames = equation_frames(table, q)
     velocities = link_velocities(frames, qd)

@@ -18,6 +18,15 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
     Each link adds (m v^2 + w . (J w) + 2 v . (w x m c)) / 2, with v the velocity of the joint frame's origin (Siciliano
     et al., Robotics, 2009, section 7.1.1), each drive I qd_i^2 / 2, and each drive that moves joints i and j together
     I qd_i qd_j.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd
+        Joint rates, n x 1.
     """
     import casadi
 
@@ -48,7 +57,15 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
 
 
 def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return the potential energy V = -sum(m g . c) of the moving links, 1 x 1, J; 0 at the world's origin."""
+    """Return the potential energy V = -sum(m g . c) of the moving links, 1 x 1, J; 0 at the world's origin.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    """
     import casadi
 
     # V = -sum of (m g . p + g . m c), with p the origin of the link's joint frame and c the centre of mass from there
@@ -63,7 +80,15 @@ def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
 
 
 def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return M = d2K/dqd2, n x n, kg m^2, kg m and kg, for q (n x 1)."""
+    """Return M = d2K/dqd2, n x n, kg m^2, kg m and kg, for q (n x 1).
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    """
     import casadi
 
     qd = casadi.SX.sym("qd", table.n)
@@ -74,6 +99,15 @@ def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) 
     """Return the Coriolis matrix of the Christoffel symbols, n x n; C qd is in N m and N.
 
     C_ij = sum over k of (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2 (Siciliano et al. 2009, eq. 7.45).
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd
+        Joint rates, n x 1.
     """
     import casadi
 
@@ -85,7 +119,15 @@ def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) 
 
 
 def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return g = dV/dq, n x 1, N m and N."""
+    """Return g = dV/dq, n x 1, N m and N.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    """
     import casadi
 
     return casadi.gradient(potential_energy(table, q), q)
@@ -94,14 +136,34 @@ def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
 def lagrange_inverse_dynamics(
     table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX
 ) -> casadi.SX:
-    """Return tau = M qdd + C qd + g, n x 1, N m and N, from the matrices."""
+    """Return tau = M qdd + C qd + g, n x 1, N m and N, from the matrices.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd, qdd
+        Joint rates and accelerations, n x 1.
+    """
     M = lagrange_mass_matrix(table, q)
     C = lagrange_coriolis_matrix(table, q, qd)
     return M @ qdd + C @ qd + lagrange_gravity_torque(table, q)
 
 
 def lagrange_torque(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
-    """Return tau = d/dt dL/dqd - dL/dq with L = K - V, n x 1: Lagrange's equations as they stand."""
+    """Return tau = d/dt dL/dqd - dL/dq with L = K - V, n x 1: Lagrange's equations as they stand.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd, qdd
+        Joint rates and accelerations, n x 1.
+    """
     import casadi
 
     L = kinetic_energy(table, q, qd) - potential_energy(table, q)

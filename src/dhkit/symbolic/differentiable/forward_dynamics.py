@@ -21,6 +21,13 @@ def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
 
     D_i is the inertia that joint i feels while the joints after it swing freely; where one is not above ``SINGULAR``
     times the largest M_ii all entries are NaN. Only the upper triangle of M is read.
+
+    Parameters
+    ----------
+    M
+        Mass matrix, n x n.
+    torque
+        Torques less C qd + g, n x 1.
     """
     import casadi
 
@@ -62,7 +69,17 @@ def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
 def recursive_forward_dynamics(
     table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX
 ) -> casadi.SX:
-    """Return the joint accelerations qdd of M qdd = tau - C qd - g, n x 1, rad/s^2 and m/s^2."""
+    """Return the joint accelerations qdd of M qdd = tau - C qd - g, n x 1, rad/s^2 and m/s^2.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd, tau
+        Joint rates and torques, n x 1.
+    """
     return solve_for_acceleration(
         composite_mass_matrix(table, q), tau - recursive_bias(table, q, qd)
     )

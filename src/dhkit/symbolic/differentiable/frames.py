@@ -117,7 +117,15 @@ class SymbolicTable:
 
 
 def joint_symbols(name: str, n: int) -> casadi.SX:
-    """Return n symbols, n x 1."""
+    """Return n symbols, n x 1.
+
+    Parameters
+    ----------
+    name
+        Name of the vector.
+    n
+        Number of joints.
+    """
     import casadi
 
     return casadi.SX.sym(name, n)
@@ -161,6 +169,15 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
 
     Column i is (z x (p_tool - p); z) for a revolute joint about the axis z through p, and (z; 0) for a prismatic one
     (Siciliano et al., Robotics, 2009, eq. 3.30).
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    frame
+        ``"world"`` or ``"tool"``.
     """
     import casadi
 
@@ -188,6 +205,17 @@ def jacobian_dot(
     """Return the time derivative of the Jacobian along qd, 6 x n, m and rad per s and unit of q.
 
     For ``"tool"``, the derivative of its components in the axes of the tool.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd
+        Joint rates, n x 1.
+    frame
+        ``"world"`` or ``"tool"``.
     """
     import casadi
 

@@ -109,6 +109,15 @@ def recursive_inverse_dynamics(
 
     Luh, Walker & Paul 1980, with accelerations by U and base parameters (Khalil & Kleinfinger 1987), in the axes that
     :class:`dhkit.symbolic.differentiable.equation_frames.EquationFrame` chooses.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd, qdd
+        Joint rates and accelerations, n x 1.
     """
     import casadi
 
@@ -157,10 +166,28 @@ def recursive_inverse_dynamics(
 
 
 def recursive_bias(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return C qd + g, n x 1: the torques, N m and N, of a motion without acceleration."""
+    """Return C qd + g, n x 1: the torques, N m and N, of a motion without acceleration.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd
+        Joint rates, n x 1.
+    """
     return recursive_inverse_dynamics(table, q, qd, [0.0] * table.n)
 
 
 def recursive_gravity(table: InertialTable, q: casadi.SX) -> casadi.SX:
-    """Return g, n x 1: the torques at rest, N m and N."""
+    """Return g, n x 1: the torques at rest, N m and N.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    """
     return recursive_inverse_dynamics(table, q, [0.0] * table.n, [0.0] * table.n)

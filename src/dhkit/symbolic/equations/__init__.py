@@ -19,6 +19,7 @@ from dhkit.symbolic.equations.quantities import (
     kinematic_quantities,
     quantities,
     readable,
+    rounded,
 )
 from dhkit.symbolic.equations.sympy_objects import equations_sympy, sympy_object
 from dhkit.symbolic.equations.text import equations_text, plain_text
@@ -51,6 +52,7 @@ __all__ = [
     "quantities",
     "readable",
     "renamings",
+    "rounded",
     "symbols_of",
     "sympy_object",
 ]

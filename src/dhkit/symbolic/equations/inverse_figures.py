@@ -20,11 +20,11 @@ _HEIGHT = 250
 """Height of a figure, in pixels."""
 _MARGIN = 46
 """Width of a figure's margin, for labels, in pixels."""
-_FIRST = "#0b5cad"
+_FIRST = "var(--mark, #0b5cad)"
 """Colour of the first solution."""
 _SECOND = "#c2570c"
 """Colour of the second solution."""
-_PLAIN = "#1b1f24"
+_PLAIN = "currentColor"
 """Colour of points."""
 _FAINT = "#8c959f"
 """Colour of auxiliary lines."""

@@ -15,19 +15,25 @@ from dhkit.symbolic.equations.inverse_text import (
     introduction,
     rule_in_dollars,
 )
-from dhkit.symbolic.equations.inverse_writing import Phrases, solved_before
+from dhkit.symbolic.equations.inverse_writing import LATEX, Phrases, solved_before
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.steps import DerivationStep
 
 _STYLE = """<style>
 .ik-step { display: flow-root; }
 .ik-step svg.figure { float: right; max-width: 100%; height: auto; margin: 0 0 .5rem 1.5rem; }
-svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: #fff; stroke-width: 4px; }
-.ik-step .solution { background: #f3f6fa; border-left: 3px solid #0b5cad; }
+svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: var(--paper, #fff); stroke-width: 4px; }
+.ik-step .solution { background: var(--tint); border-left: 3px solid var(--mark); }
 .ik-step .display { padding-top: .25rem; padding-bottom: .25rem; } .ik-step p { margin: .35rem 0; }
-.ik-known { color: #57606a; }
+.ik-known { color: var(--faint); }
 </style>"""
-_ANGLE = re.compile(r"\b(theta)(\d+)\b|\bphi\b")
+_NAME = r"(?:theta\d+|(?:theta|q)_i|phi|[pnoa][xyz]|r\d\d|[adq]\d|[sc]\d+)"
+_FACTOR = rf"(?:(?:abs|sqrt)\([^()]*\)|\b{_NAME}\b(?:\^2)?)"
+_FORMULA = re.compile(rf"{_FACTOR}(?: [-+=] (?:{_FACTOR}|\d+(?:\.\d+)?\b))*")
+"""A formula in a sentence: names, absolute values and roots, with signs between them."""
+_SUBSCRIPT = re.compile(r"\b(theta|phi|[a-z])_?(\d+|[xyzi])?\b")
+_CALL = re.compile(r"((?:abs|sqrt)\([^()]*\))")
+_LETTERS = {"theta": r"\theta", "phi": r"\varphi"}
 
 
 def inverse_page(derivation: InverseDerivation) -> str:
@@ -45,10 +51,11 @@ def inverse_page(derivation: InverseDerivation) -> str:
 
 def _body(derivation: InverseDerivation) -> str:
     """Return a derivation as HTML to stand inside a page or a notebook."""
-    write = Phrases(derivation, latex=True)
+    write = Phrases(derivation, LATEX)
     T = sample_pose(derivation)
     first, given, angles = introduction(derivation)
-    parts = [_STYLE, f"<p>{escape(first)} {escape(given or GIVEN)}</p>", f"<p>{_words(angles)}</p>"]
+    opening = f"{first} {given or GIVEN}"
+    parts = [_STYLE, f"<p>{_words(opening)}</p>", f"<p>{_words(angles)}</p>"]
     for number, step in enumerate(derivation.steps, start=1):
         title = _words(step.unknown.name if step.unknown else step.title)
         parts.append(f'<section class="ik-step"><h2>{number}. {title}</h2>')
@@ -59,12 +66,12 @@ def _body(derivation: InverseDerivation) -> str:
         parts.append("<h2>Joint values</h2><p>Turned into (−π, π]:</p>")
         parts += [_display(f"{name} = {value}") for name, value in joints]
     for condition in derivation.conditions:
-        parts.append(f"<p>{escape(condition.look)}</p>")
+        parts.append(f"<p>{_words(condition.look)}</p>")
         parts.append(
             _display(f"{write.element(condition.left)} = {write.element(condition.right)}")
         )
-    parts.append(f"<p>{escape(branches_sentence(derivation))}</p>")
-    parts += [f'<p class="note">{escape(note)}</p>' for note in derivation.notes]
+    parts.append(f"<p>{_words(branches_sentence(derivation))}</p>")
+    parts += [f'<p class="note">{_words(note)}</p>' for note in derivation.notes]
     return "\n".join(filter(None, parts))
 
 
@@ -112,13 +119,32 @@ def _inline(latex: str) -> str:
 
 
 def _words(text: str) -> str:
-    """Return words with the names of angles as MathML."""
+    """Return words with formulas, such as px, abs(d3) and theta2, as MathML."""
     parts = []
     at = 0
-    for match in _ANGLE.finditer(text):
-        angle = rf"\theta_{{{match[2]}}}" if match[1] else r"\varphi"
+    for match in _FORMULA.finditer(text):
         parts.append(escape(text[at : match.start()]))
-        parts.append(_inline(angle))
+        parts.append(_inline(_formula_latex(match[0])))
         at = match.end()
     parts.append(escape(text[at:]))
     return "".join(parts)
+
+
+def _formula_latex(formula: str) -> str:
+    """Return a formula of a sentence in LaTeX: ``abs(d3) - sqrt(px^2)`` with bars, roots and subscripts."""
+    parts = []
+    for part in _CALL.split(formula):
+        function, is_call, argument = part.partition("(")
+        inner = _SUBSCRIPT.sub(_name_latex, argument.removesuffix(")") if is_call else part)
+        if not is_call:
+            parts.append(inner)
+        elif function == "abs":
+            parts.append(rf"\left| {inner} \right|")
+        else:
+            parts.append(rf"\sqrt{{{inner}}}")
+    return "".join(parts)
+
+
+def _name_latex(match: re.Match[str]) -> str:
+    letter = _LETTERS.get(match[1], match[1])
+    return f"{letter}_{{{match[2]}}}" if match[2] else letter

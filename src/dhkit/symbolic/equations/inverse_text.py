@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 
 from dhkit.display import html_table
-from dhkit.symbolic.equations.inverse_writing import Phrases, phi_label, solved_before
+from dhkit.symbolic.equations.inverse_writing import LATEX, TEXT, Phrases, phi_label, solved_before
 from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.text import WIDTH, broken_lines
 from dhkit.symbolic.inverse.derivation import InverseDerivation
@@ -20,7 +20,7 @@ _LONGEST_LINE = 200
 
 def inverse_text(derivation: InverseDerivation) -> str:
     """Return a derivation as text, step by step."""
-    write = Phrases(derivation, latex=False)
+    write = Phrases(derivation, TEXT)
     lines = [f"{derivation.description.name}: inverse kinematics, step by step", ""]
     for sentence in introduction(derivation):
         lines += textwrap.wrap(sentence, WIDTH)
@@ -45,7 +45,7 @@ def inverse_text(derivation: InverseDerivation) -> str:
 
 def inverse_table(derivation: InverseDerivation) -> str:
     """Return a derivation's definitions, equations and solutions as a table of HTML, a row for each step."""
-    write = Phrases(derivation, latex=False)
+    write = Phrases(derivation, TEXT)
     rows = []
     for step in derivation.steps:
         # Title, equation and solution; the title stands in the step's first row alone.
@@ -148,7 +148,7 @@ def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -
 
 def inverse_latex(derivation: InverseDerivation) -> str:
     """Return a derivation in LaTeX, for a page that loads amsmath."""
-    write = Phrases(derivation, latex=True)
+    write = Phrases(derivation, LATEX)
     parts = [" ".join(escaped(sentence) for sentence in introduction(derivation))]
     for step in derivation.steps:
         title = f"${write.unknown(step.unknown)}$" if step.unknown else escaped(step.title)

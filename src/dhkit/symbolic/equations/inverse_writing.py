@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.latex import LatexWriter
-from dhkit.symbolic.equations.latex_names import latex_names
+from dhkit.symbolic.equations.latex_names import Face, Part, TypesetName, typeset_names
 from dhkit.symbolic.equations.text import TextWriter
+from dhkit.symbolic.equations.typst import typst_printer
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.forms import Circle, CosineAndSquare, Flip, Form, Remainder, Unknown
 from dhkit.symbolic.inverse.steps import Choice, DerivationStep
-from dhkit.symbolic.ring import Element
+from dhkit.symbolic.ring import Element, Ring
 from dhkit.symbolic.ring.notation import Notation, generators_of, notation, symbols_of
 
 _INLINE = 70
 """Largest number of characters of the letters' values that are written inside a solution; longer ones are listed after
-it. In LaTeX twice as many."""
+it. In LaTeX and typst twice as many."""
 PLACEHOLDER = re.compile(r"<(\w+)>")
 """A placeholder in the solution of a form."""
 _ANGLE = re.compile(r"\b(theta|phi)(\d*)\b")
@@ -44,6 +45,87 @@ class Solution:
     letters: tuple[tuple[str, str], ...]
 
 
+def _text_printer(ring: Ring, names: Mapping[str, TypesetName], written: Notation) -> Printer[str]:
+    """Return the printer of a ring's elements as text."""
+    return Printer(ring.generators, TextWriter(written))
+
+
+def _latex_printer(ring: Ring, names: Mapping[str, TypesetName], written: Notation) -> Printer[str]:
+    """Return the printer of a ring's elements in LaTeX, with these names of constants."""
+    latex = {name: typeset.latex for name, typeset in names.items()}
+    return Printer(ring.generators, LatexWriter(latex, written))
+
+
+@dataclass(frozen=True)
+class Style:
+    """A notation of derivations.
+
+    Attributes
+    ----------
+    printer
+        Makes the printer of a ring's elements from the ring, the constants' symbols and their printed names.
+    templates
+        Returns the templates of a form's solution.
+    angle, position
+        Replacements of theta1 and q1, whose number is group 2 and group 1.
+    phi
+        The angle phi.
+    square
+        What is written after a factor that is squared.
+    inline
+        Largest number of characters of the letters' values that are written inside a solution.
+    circle_without_sine
+        The value of atan2(0, A).
+    """
+
+    printer: Callable[[Ring, Mapping[str, TypesetName], Notation], Printer[str]]
+    templates: Callable[[Form], tuple[str, ...]]
+    angle: str
+    position: str
+    phi: str
+    square: str
+    inline: int
+    circle_without_sine: tuple[str, str]
+
+
+TEXT = Style(
+    printer=_text_printer,
+    templates=lambda form: form.text,
+    angle=r"\g<0>",
+    position=r"\g<0>",
+    phi="phi",
+    square="^2",
+    inline=_INLINE,
+    circle_without_sine=("atan2(0, A)", "0 where A > 0, else pi"),
+)
+"""Formulas as text."""
+LATEX = Style(
+    printer=_latex_printer,
+    templates=lambda form: form.latex,
+    angle=r"\\theta_{\2}",
+    position=r"q_{\1}",
+    phi=r"\varphi",
+    square="^{2}",
+    inline=2 * _INLINE,
+    circle_without_sine=(
+        r"\mathrm{atan2}(0,\, A)",
+        r"0 \text{ where } A > 0, \text{ else } \pi",
+    ),
+)
+"""Formulas in LaTeX."""
+TYPST = Style(
+    printer=typst_printer,
+    templates=lambda form: tuple(t.replace("atan2(", 'op("atan2") (') for t in form.text),
+    angle=r"theta_(\2)",
+    position=r"q_(\1)",
+    phi="phi",
+    square="^2",
+    inline=2 * _INLINE,
+    circle_without_sine=('op("atan2") (0, A)', '0 " where " A > 0, " else " pi'),
+)
+"""Formulas in typst."""
+
+
 class Phrases:
     """Writes the formulas of one derivation in one notation.
 
@@ -51,32 +133,31 @@ class Phrases:
     ----------
     derivation
         The derivation.
-    latex
-        Whether they are LaTeX; else text.
+    style
+        The notation: :data:`TEXT`, :data:`LATEX` or :data:`TYPST`.
     """
 
-    def __init__(self, derivation: InverseDerivation, *, latex: bool) -> None:
+    def __init__(self, derivation: InverseDerivation, style: Style) -> None:
         self.derivation = derivation
-        self.is_latex = latex
+        self.style = style
         ring = derivation.chain.ring
-        self._printer: Printer[str]
-        if latex:
-            names = _written_names(derivation)
-            typeset = latex_names(set(names.names.values()) | symbols_of(ring.generators))
-            for name in ("cphi", "sphi"):
-                own = derivation.chain.names[name]
-                typeset[names(own)] = _phi_latex(name[0], derivation)
-            self._printer = Printer(ring.generators, LatexWriter(typeset, names))
-        else:
-            self._printer = Printer(ring.generators, TextWriter(_written_names(derivation)))
+        names = _written_names(derivation)
+        typeset = typeset_names(set(names.names.values()) | symbols_of(ring.generators))
+        for name in ("cphi", "sphi"):
+            typeset[names(derivation.chain.names[name])] = _phi_name(name[0], derivation)
+        self._printer: Printer[str] = style.printer(ring, typeset, names)
 
-    def element(self, element: Element) -> str:
-        """Return an element in one line, with a positive term first if it has one."""
+    def marked(self, element: Element) -> str:
+        """Return an element with a positive term first if it has one, and line ends where lines may be broken."""
         products = list(collected(element))
         first = next((k for k, product in enumerate(products) if product.coefficient > 0), 0)
         if products:
             products.insert(0, products.pop(first))
-        return self._printer.sum(products).replace("\n", "")
+        return self._printer.sum(products)
+
+    def element(self, element: Element) -> str:
+        """Return an element in one line, with a positive term first if it has one."""
+        return self.marked(element).replace("\n", "")
 
     def name(self, name: str) -> str:
         """Return a defined quantity's name."""
@@ -88,10 +169,12 @@ class Phrases:
 
     def angles(self, text: str) -> str:
         """Return a text with theta1, phi and q1 in this notation."""
-        if not self.is_latex:
+        if self.style.angle == r"\g<0>":
             return text
-        text = _ANGLE.sub(lambda m: r"\varphi" if m[1] == "phi" else rf"\theta_{{{m[2]}}}", text)
-        return re.sub(r"\bq(\d+)\b", r"q_{\1}", text)
+        text = _ANGLE.sub(
+            lambda m: self.style.phi if m[1] == "phi" else m.expand(self.style.angle), text
+        )
+        return re.sub(r"\bq(\d+)\b", self.style.position, text)
 
     def equations(self, step: DerivationStep) -> list[tuple[str, str]]:
         """Return both sides of a step's equations; the angle that remains of phi as a sum."""
@@ -104,8 +187,7 @@ class Phrases:
         if isinstance(form, CosineAndSquare):
             # The ring writes the square of a sine as 1 - c^2.
             cosine_equation, (_, square) = sides
-            squared = "^{2}" if self.is_latex else "^2"
-            sides = [cosine_equation, (self.element(form.unknown.sine) + squared, square)]
+            sides = [cosine_equation, (self.element(form.unknown.sine) + self.style.square, square)]
         return sides
 
     def solution(self, form: Form) -> Solution:
@@ -113,7 +195,7 @@ class Phrases:
         name = self.unknown(form.unknown)
         if isinstance(form, Remainder):
             return Solution(name, (self._sum(form.terms),), ())
-        templates = form.latex if self.is_latex else form.text
+        templates = self.style.templates(form)
         placeholders = dict.fromkeys(PLACEHOLDER.findall(" ".join(templates)))
         derived = form.derived
 
@@ -122,7 +204,7 @@ class Phrases:
             k: self.element(derived[k][1] if k in derived else form.letters[k])
             for k in placeholders
         }
-        if sum(map(len, values.values())) <= _INLINE * (2 if self.is_latex else 1):
+        if sum(map(len, values.values())) <= self.style.inline:
             alternatives = [_filled(template, values).removeprefix("0 ") for template in templates]
             return Solution(name, tuple(alternatives), ())
 
@@ -138,12 +220,7 @@ class Phrases:
         occurring = sorted(set(re.findall(r"[A-Zk](?![a-z])", " ".join(in_letters.values()))))
         letters = [(k, self.element(form.letters[k])) for k in occurring if k in form.letters]
         if isinstance(form, Circle) and form.letters["B"].is_zero:
-            if self.is_latex:
-                letters.append(
-                    (r"\mathrm{atan2}(0,\, A)", r"0 \text{ where } A > 0, \text{ else } \pi")
-                )
-            else:
-                letters.append(("atan2(0, A)", "0 where A > 0, else pi"))
+            letters.append(self.style.circle_without_sine)
         alternatives = [_filled(template, in_letters) for template in templates]
         return Solution(name, tuple(alternatives), tuple(letters))
 
@@ -165,7 +242,9 @@ class Phrases:
 
     def _letters(self, text: str) -> str:
         """Return an expression in letters in this notation."""
-        return text.replace("*", r" ").replace("^2", "^{2}") if self.is_latex else text
+        return (
+            text if self.style is TEXT else text.replace("*", " ").replace("^2", self.style.square)
+        )
 
     def _sum(self, terms: Sequence[tuple[str, int]]) -> str:
         """Return a sum of angles, each with 1 or -1."""
@@ -204,11 +283,11 @@ def phi_label(derivation: InverseDerivation) -> str:
     return "".join(str(joint) for joint, _ in derivation.sum) if is_plain else "phi"
 
 
-def _phi_latex(function: str, derivation: InverseDerivation) -> str:
-    r"""Return the name of the cosine or sine of phi in LaTeX: c_{23}, or c_{\varphi}."""
+def _phi_name(function: str, derivation: InverseDerivation) -> TypesetName:
+    r"""Return the name of the cosine or sine of phi: c_{23}, or c_{\varphi}."""
     label = phi_label(derivation)
-    subscript = r"\varphi" if label == "phi" else label
-    return rf"{function}_{{{subscript}}}"
+    subscript = Part("varphi", Face.GREEK) if label == "phi" else Part(label)
+    return TypesetName(Part(function), (subscript,))
 
 
 def _written_names(derivation: InverseDerivation) -> Notation:

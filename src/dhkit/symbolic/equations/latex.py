@@ -12,7 +12,7 @@ import numpy as np
 
 from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.latex_document import escaped
-from dhkit.symbolic.equations.latex_names import latex_names
+from dhkit.symbolic.equations.latex_names import TypesetName, typeset_names
 from dhkit.symbolic.equations.quantities import Quantity, check_length, elements_of
 from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator, Ring
@@ -29,7 +29,7 @@ from dhkit.symbolic.ring.notation import (
 
 _LINE = 62
 """Symbols of a line: one is 0.4 to 0.5 em wide, and a line of an article in 11 points is 32.8 em."""
-_SYMBOLS_PER_EM = 2
+SYMBOLS_PER_EM = 2
 """Number of symbols that take the width of an em."""
 _FRACTION = re.compile(r"\\t?frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}")
 _INVISIBLE = re.compile(
@@ -37,7 +37,7 @@ _INVISIBLE = re.compile(
 )
 """Commands that print nothing beside other symbols; of a function's name, the backslash."""
 _INDENT = r"\qquad "
-_BREAK = "\n"
+BREAK = "\n"
 """Mark before a sign at which a line may be broken."""
 FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "atan2": r"\mathrm{atan2}"}
 """Functions that have another name in LaTeX."""
@@ -73,7 +73,7 @@ class LatexWriter:
         return r"\pi"
 
     def call(self, function: str, arguments: Sequence[str]) -> str:  # noqa: D102
-        inner = ", ".join(arguments).replace(_BREAK, "")
+        inner = ", ".join(arguments).replace(BREAK, "")
         if function == "sqrt":
             return rf"\sqrt{{{inner}}}"
         if function == "abs":
@@ -110,14 +110,14 @@ class LatexWriter:
             if dividend == number:
                 number = ""
             fraction = rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}"
-            factors.insert(0, fraction.replace(_BREAK, ""))
+            factors.insert(0, fraction.replace(BREAK, ""))
 
         if number and (number != "1" or not factors):
             factors.insert(0, number + r"\," if decimal and factors else number)
         return _spaced(factors)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
-        signed = _BREAK.join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
+        signed = BREAK.join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
         return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
 
 
@@ -138,12 +138,12 @@ def latex_text(element: Element) -> str:
     >>> print(latex_text(lagrangian(library_robot("planar2r")).M[1, 1]))
     \tfrac{1}{3} m_{2} l_{2}^{2}
     """
-    return _marked(element).replace(_BREAK, "")
+    return marked_latex(element).replace(BREAK, "")
 
 
 def latex_lines(element: Element, room: float) -> list[str]:
     """Return an element in LaTeX as lines of about ``room`` em at most, broken before terms."""
-    return _lines(_marked(element), int(_SYMBOLS_PER_EM * room))
+    return _lines(marked_latex(element), int(SYMBOLS_PER_EM * room))
 
 
 def displays(quantities: Sequence[Quantity]) -> list[str]:
@@ -155,7 +155,12 @@ def displays(quantities: Sequence[Quantity]) -> list[str]:
         An entry is too long to be read.
     """
     check_length(quantities)
-    shown = [_matrix(quantity) or _entries(quantity) for quantity in quantities]
+    shown = []
+    for quantity in quantities:
+        matrix = matrix_latex(quantity)
+        shown.append(
+            f"\\begin{{equation*}}\n{matrix}\n\\end{{equation*}}" if matrix else _entries(quantity)
+        )
     angles = angles_of(generators_of(elements_of(quantities)))
     if angles:
         shown.append(_where(angles))
@@ -170,10 +175,15 @@ def equations_latex(quantities: Sequence[Quantity]) -> str:
 
 def constant_latex(ring: Ring, name: str) -> str:
     """Return a constant's name in LaTeX."""
-    return _writer(ring).symbol(name)
+    return constant_typeset(ring, name).latex
 
 
-def _marked(element: Element) -> str:
+def constant_typeset(ring: Ring, name: str) -> TypesetName:
+    """Return a constant's name as a symbol with subscripts."""
+    return typeset_constants(ring)[notation(ring)(name)]
+
+
+def marked_latex(element: Element) -> str:
     """Return an element in LaTeX with marks at which lines may be broken."""
     printer = Printer(element.ring.generators, _writer(element.ring))
     return printer.sum(collected(element))
@@ -182,14 +192,20 @@ def _marked(element: Element) -> str:
 @lru_cache(maxsize=64)
 def _writer(ring: Ring) -> LatexWriter:
     """Return the writer of a ring's elements."""
-    written = notation(ring)
+    latex = {name: typeset.latex for name, typeset in typeset_constants(ring).items()}
+    return LatexWriter(latex, notation(ring))
+
+
+@lru_cache(maxsize=64)
+def typeset_constants(ring: Ring) -> dict[str, TypesetName]:
+    """Return the constants of a ring as symbols, by their printed names; none looks like a variable or an entry."""
     taken = {_variable_latex(name) for name in variables(ring)}
-    taken |= {_head(name) for name in entry_names(ring.n)}
-    return LatexWriter(latex_names(written.names.values(), taken), written)
+    taken |= {head_latex(name) for name in entry_names(ring.n)}
+    return typeset_names(notation(ring).names.values(), taken)
 
 
-def _matrix(quantity: Quantity) -> str:
-    """Return a matrix or a column in brackets; empty if it is wider than a line, or a scalar."""
+def matrix_latex(quantity: Quantity) -> str:
+    """Return an equation of a matrix or a column in brackets; empty if it is wider than a line, or a scalar."""
     if not quantity.elements.ndim or quantity.labels:
         return ""
     table = quantity.elements.reshape(len(quantity.elements), -1)
@@ -201,17 +217,17 @@ def _matrix(quantity: Quantity) -> str:
     for place, element in np.ndenumerate(table):
         cell = latex_text(element)
         cells[place] = cell
-        symbols[place] = _symbols(cell)
+        symbols[place] = symbols_wide(cell)
 
-    head = _WHOLE.get(quantity.name) or _HEADS.get(quantity.name) or _head(quantity.name)
+    head = _WHOLE.get(quantity.name) or _HEADS.get(quantity.name) or head_latex(quantity.name)
     width_of_columns = int(symbols.max(axis=0).sum())
-    gaps = _SYMBOLS_PER_EM * (table.shape[1] + 1)  # an em between columns, and for each bracket
-    if _symbols(f"{head} =") + width_of_columns + gaps > _LINE:
+    gaps = SYMBOLS_PER_EM * (table.shape[1] + 1)  # an em between columns, and for each bracket
+    if symbols_wide(f"{head} =") + width_of_columns + gaps > _LINE:
         return ""
 
     rows = cells.tolist()
     body = " \\\\\n".join(" & ".join(row) for row in rows)
-    return f"\\begin{{equation*}}\n{head} = \\begin{{pmatrix}}\n{body}\n\\end{{pmatrix}}\n\\end{{equation*}}"
+    return f"{head} = \\begin{{pmatrix}}\n{body}\n\\end{{pmatrix}}"
 
 
 def _entries(quantity: Quantity) -> str:
@@ -219,16 +235,16 @@ def _entries(quantity: Quantity) -> str:
     heads: list[str] = []
     elements: list[Element] = []
     for names, element in quantity.entries:
-        heads.append(" = ".join(_head(name) for name in names))
+        heads.append(" = ".join(head_latex(name) for name in names))
         elements.append(element)
 
     lines: list[str] = []
-    room = _LINE - max((_symbols(f"{head} =") for head in heads), default=0)
+    room = _LINE - max((symbols_wide(f"{head} =") for head in heads), default=0)
     for head, element in zip(heads, elements, strict=True):
-        first, *more = _lines(_marked(element), room)
+        first, *more = _lines(marked_latex(element), room)
         lines += [f"{head} &= {first}", *(f"&{_INDENT}{line}" for line in more)]
 
-    zeros = [_head(name) for name in quantity.zeros]
+    zeros = [head_latex(name) for name in quantity.zeros]
     if len(zeros) == 1:
         lines.append(f"{zeros[0]} &= 0")
     else:
@@ -238,7 +254,7 @@ def _entries(quantity: Quantity) -> str:
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
 
 
-def _head(name: str) -> str:
+def head_latex(name: str) -> str:
     r"""Return the name of a quantity or an entry in LaTeX: M12 is M_{12}, A1_12 is (A_{1})_{12}."""
     link = re.fullmatch(r"A(\d+)_(\d+)", name)
     if link:
@@ -251,9 +267,9 @@ def _head(name: str) -> str:
     return f"{head}_{{{subscript}}}" if subscript else head
 
 
-def _symbols(latex: str) -> int:
+def symbols_wide(latex: str) -> int:
     """Count the symbols side by side: a sign counts for three with its space, a fraction as its longer part."""
-    latex = _FRACTION.sub(lambda match: max(match.groups(), key=_symbols), latex)
+    latex = _FRACTION.sub(lambda match: max(match.groups(), key=symbols_wide), latex)
     latex = latex.replace(r"\qquad", "xxxx")
     latex = _INVISIBLE.sub("", latex)
     latex = re.sub(r"\\(?:[A-Za-z]+|.)", "x", latex)
@@ -263,37 +279,50 @@ def _symbols(latex: str) -> int:
 
 def _lines(marked: str, room: int) -> list[str]:
     """Break a sum before terms, and inside those that are longer than a line."""
-    lines = []
+    pieces = marked.split(BREAK)
+    starts = line_starts(marked, room)
+    return ["".join(pieces[a:b]).strip() for a, b in pairwise([*starts, len(pieces)])]
+
+
+def line_starts(marked: str, room: float) -> list[int]:
+    """Return which of the pieces between marks begin a line: terms, and pieces of terms that are longer than a line.
+
+    Parameters
+    ----------
+    marked
+        A sum in LaTeX with marks at which lines may be broken.
+    room
+        Length of a line in symbols.
+    """
+    starts = [0]
     line = ""
+    at = 0
     for term in _terms(marked):
-        whole = term.replace(_BREAK, "")
-        if _symbols(line + whole) <= room:
-            pieces = [whole]
-        elif line and _symbols(whole) <= room:
+        whole = "".join(term)
+        if symbols_wide(line + whole) <= room:
+            line += whole
+        elif line and symbols_wide(whole) <= room:
             # A line of its own.
-            lines.append(line)
-            line = ""
-            pieces = [whole]
+            starts.append(at)
+            line = whole
         else:
-            pieces = term.split(_BREAK)
+            for k, piece in enumerate(term):
+                if line and symbols_wide(line + piece) > room:
+                    starts.append(at + k)
+                    line = ""
+                line += piece
+        at += len(term)
+    return starts
 
-        for piece in pieces:
-            if line and _symbols(line + piece) > room:
-                lines.append(line)
-                line = ""
-            line += piece
-    return [text.strip() for text in [*lines, line]]
 
-
-def _terms(marked: str) -> list[str]:
-    """Split a sum before the signs outside of brackets; breaks inside stay marked."""
-    terms = []
+def _terms(marked: str) -> list[list[str]]:
+    """Split a sum before the signs outside of brackets: the pieces between marks of each term."""
+    terms: list[list[str]] = []
     depth = 0
-    for piece in marked.split(_BREAK):
+    for piece in marked.split(BREAK):
         if depth == 0:
-            terms.append(piece)
-        else:
-            terms[-1] += _BREAK + piece
+            terms.append([])
+        terms[-1].append(piece)
         depth += piece.count("(") - piece.count(")")
     return terms
 
@@ -310,7 +339,7 @@ def _where(angles: Sequence[SineOrCosine]) -> str:
 
     lines: list[str] = []
     for definition in definitions:
-        if lines and _symbols(f"{lines[-1]},{_INDENT}{definition}") <= _LINE:
+        if lines and symbols_wide(f"{lines[-1]},{_INDENT}{definition}") <= _LINE:
             lines[-1] += f",{_INDENT}{definition}"
         else:
             lines.append(f"&{definition}")

@@ -5,14 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
+from dhkit.expressions.exact import MAX_FRACTION_PART
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.exact.lagrangian import QUANTITIES, Lagrangian
 from dhkit.symbolic.kinematics import SymbolicKinematics
 from dhkit.symbolic.ring import Element, Elements, RingError, element_array
-from dhkit.symbolic.ring.notation import entry_name, generators_of
+from dhkit.symbolic.ring.notation import constants_of, entry_name, generators_of, symbols_of
 
 KINEMATIC_QUANTITIES = {
     "A": "link transforms",
@@ -21,6 +23,8 @@ KINEMATIC_QUANTITIES = {
 }
 """The quantities of kinematics that can be printed, with their names in words; A stands for A1 ... An."""
 _LINK = re.compile(r"A([1-9][0-9]*)")
+_NOISE = 1e-7
+"""Size of terms of equations with symbols that rounded equations leave out, as a share of the entry's largest."""
 MAX_PRINTED_TERMS = 2_000
 """Largest number of terms of an entry that text and LaTeX print."""
 
@@ -161,6 +165,47 @@ def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     elements = np.empty(len(labels), dtype=object)
     elements[:] = [lag.definitions[name] for name in labels]
     return [*found, Quantity("definitions", elements, labels)]
+
+
+def rounded(quantity: Quantity, digits: int) -> Quantity:
+    """Return a quantity whose coefficients are rounded to significant digits, to be read; short fractions stay exact.
+
+    Terms smaller than a unit of the digit after the last one of the entry's largest coefficient are left out; in
+    equations with symbols, whose sizes are not known, those smaller by a factor of 1e-7.
+
+    Parameters
+    ----------
+    quantity
+        The quantity.
+    digits
+        Number of significant digits, 1 or more.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.symbolic.exact.lagrangian import lagrangian
+    >>> (M,) = quantities(lagrangian(library_robot("puma560"), "none"), "M")
+    >>> print(M.elements[4, 4], rounded(M, 3).elements[4, 4])
+    0.171348451657 0.171
+    """
+    elements = np.empty(quantity.elements.shape, dtype=object)
+    for place, element in np.ndenumerate(quantity.elements):
+        largest = max((abs(float(c)) for c in element.terms.values()), default=0.0)
+        has_symbols = bool(symbols_of(constants_of(generators_of([element]))))
+        least = largest * (_NOISE if has_symbols else 10.0 ** -(digits + 1))
+        terms = {
+            monomial: _rounded(coefficient, digits)
+            for monomial, coefficient in element.terms.items()
+            if abs(float(coefficient)) >= least
+        }
+        elements[place] = element.ring.from_terms(terms)
+    return Quantity(quantity.name, elements, quantity.labels)
+
+
+def _rounded(value: Fraction, digits: int) -> Fraction:
+    """Return a rational rounded to significant digits; a short fraction as it is."""
+    is_short = max(abs(value.numerator), value.denominator) <= MAX_FRACTION_PART
+    return value if is_short else Fraction(f"{float(value):.{digits - 1}e}")
 
 
 def check_length(quantities: Sequence[Quantity]) -> None:

@@ -142,7 +142,7 @@ class ExactArm:
         Returns
         -------
         Array
-            Shape (..., *elements.shape), SI.
+            Shape ``(..., *elements.shape)``, SI.
 
         Raises
         ------

@@ -223,7 +223,22 @@ class Lagrangian:
         qd: ArrayLike | None = None,
         qdd: ArrayLike | None = None,
     ) -> Array:
-        """Return values of elements at states (..., n), shape (..., *elements.shape); see :meth:`ExactArm.evaluate`."""
+        """Return values at states (..., n), shape ``(..., *elements.shape)``; see :meth:`ExactArm.evaluate`.
+
+        Parameters
+        ----------
+        elements
+            Elements, or arrays of them, such as ``M`` or ``tau``.
+        q, qd, qdd
+            Joint values, rates and accelerations, shape (..., n), rad, m and seconds.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> arm.lagrangian.evaluate(arm.lagrangian.g, [0, 0]).round(3)
+        array([15.206,  2.943])
+        """
         return self.arm.evaluate(elements, q, qd, qdd)
 
     # Reading
@@ -231,10 +246,27 @@ class Lagrangian:
     def text(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
         """Return some of M, C, h, g, tau, K and V as text, entry by entry, in the angles that make them shortest.
 
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"M"``, ``"C"``, ``"h"``, ``"g"``, ``"tau"``, ``"K"``, ``"V"``.
+
+        Returns
+        -------
+        str
+            One line an entry, then the abbreviations.
+
         Raises
         ------
         RingError
             An entry is too long to be read.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> print(arm.lagrangian.text(("g",)).splitlines()[1])
+        g2 = m2*g*l2*c12/2
         """
         quantities = format_function("readable")(self, what)
         return str(format_function("equations_text")(quantities))
@@ -242,16 +274,41 @@ class Lagrangian:
     def latex(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
         """Return some of M, C, h, g, tau, K and V in LaTeX, for a page that loads amsmath.
 
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"M"``, ``"C"``, ``"h"``, ``"g"``, ``"tau"``, ``"K"``, ``"V"``.
+
         Raises
         ------
         RingError
             An entry is too long to be read.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> "g_{2}" in arm.lagrangian.latex(("g",)) or "g" in arm.lagrangian.latex(("g",))
+        True
         """
         quantities = format_function("readable")(self, what)
         return str(format_function("equations_latex")(quantities))
 
     def sympy(self, what: str | Sequence[str] = tuple(QUANTITIES)) -> dict[str, object]:
-        """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified."""
+        """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified.
+
+        Parameters
+        ----------
+        what
+            Quantities by name: ``"M"``, ``"C"``, ``"h"``, ``"g"``, ``"tau"``, ``"K"``, ``"V"``.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> arm = Arm.load("planar2r")
+        >>> arm.lagrangian.sympy(("g",))["g"][1]
+        g*l2*m2*cos(q1 + q2)/2
+        """
         quantities = format_function("quantities")(self, what)
         matrices: dict[str, object] = format_function("equations_sympy")(quantities)
         return matrices
@@ -311,6 +368,16 @@ class Lagrangian:
 def lagrangian(
     description: Description, symbols: Symbols = "file", needed: tuple[Expression, ...] = ()
 ) -> Lagrangian:
-    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for the arguments."""
+    """Return a description's equations of motion; see :func:`dhkit.symbolic.exact_arm` for the arguments.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    symbols
+        ``"none"``, ``"file"`` or ``"inertial"``: names that stay symbols.
+    needed
+        Further expressions whose constants the ring contains.
+    """
     arm = exact_arm(description, symbols, needed)
     return Lagrangian(arm, composite.mass_matrix(arm), composite.potential_energy(arm))

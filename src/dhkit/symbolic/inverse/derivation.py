@@ -187,6 +187,11 @@ class InverseDerivation:
     def code(self, language: str = "c") -> dict[str, str]:
         """Return source files by name that compute all branches, in ``"c"``, ``"python"`` or ``"matlab"``.
 
+        Parameters
+        ----------
+        language
+            ``"c"``, ``"python"`` or ``"matlab"``.
+
         Raises
         ------
         ValueError
@@ -199,6 +204,13 @@ class InverseDerivation:
 
     def export(self, folder: str | Path, language: str = "c") -> tuple[Path, ...]:
         """Write the files of :meth:`code` into a folder, which is made if there is none; return their paths.
+
+        Parameters
+        ----------
+        folder
+            Folder to write into; it is made if there is none.
+        language
+            ``"c"``, ``"python"`` or ``"matlab"``.
 
         Raises
         ------
@@ -331,7 +343,13 @@ class InverseDerivation:
         return result.reshape((*T.shape[:-2], B, self.n))
 
     def candidates(self, T: Array) -> Iterator[tuple[Values, Array]]:
-        """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and a solution mask (N,)."""
+        """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and a solution mask (N,).
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (N, 4, 4), m.
+        """
         with_roots = [
             k
             for k, step in enumerate(self.steps)

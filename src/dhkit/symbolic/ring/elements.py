@@ -229,7 +229,13 @@ class Element:
     # Calculus
 
     def by_position(self, i: int) -> Element:
-        """Return the partial derivative by joint i's variable."""
+        """Return the partial derivative by joint i's variable.
+
+        Parameters
+        ----------
+        i
+            Joint, from 0.
+        """
         ring = self.ring
         f = self.polynomial
         derivative = ring.polynomials.derivative
@@ -247,13 +253,25 @@ class Element:
         return Element(ring, total).reduced()
 
     def by_rate(self, i: int) -> Element:
-        """Return the partial derivative by joint i's rate."""
+        """Return the partial derivative by joint i's rate.
+
+        Parameters
+        ----------
+        i
+            Joint, from 0.
+        """
         return Element(
             self.ring, self.ring.polynomials.derivative(self.polynomial, self.ring.place("rate", i))
         )
 
     def by_constant(self, text: str) -> Element:
-        """Return the partial derivative by a constant that no other constant depends on."""
+        """Return the partial derivative by a constant that no other constant depends on.
+
+        Parameters
+        ----------
+        text
+            Name of the constant.
+        """
         place = self.ring.place("constant", text)
         return Element(self.ring, self.ring.polynomials.derivative(self.polynomial, place))
 
@@ -266,7 +284,13 @@ class Element:
         return ring.sum([*by_positions, *by_rates])
 
     def value(self, values: Sequence[Any]) -> Any:
-        """Return the element's value, a number or an array (...), at :meth:`PolynomialRing.values` of a state."""
+        """Return the element's value, a number or an array (...), at :meth:`PolynomialRing.values` of a state.
+
+        Parameters
+        ----------
+        values
+            Values of the ring's generators.
+        """
         total: Any = 0.0
         for coefficient, powers in self._products:
             product: Any = coefficient

@@ -65,6 +65,8 @@ class Page {
     document.head.append(
       Object.assign(document.createElement("link"), { rel: "stylesheet", href: "lab/lab.css" }),
     );
+    const font = new FontFace("dhkit math", 'url("lab/math.woff2")');
+    document.fonts.add(font);
     const [{ Requests }, { PANELS }] = await Promise.all([
       import("./lab/requests.js"),
       import("./lab/panels.js"),

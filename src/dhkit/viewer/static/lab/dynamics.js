@@ -113,7 +113,7 @@ export class DynamicsPanel extends FollowingPanel {
       // The limit is a mark where the scale of the bars, the largest torque, reaches it.
       const place = limit === null ? Infinity : limit / largest;
       mark.hidden = place > 1;
-      mark.style.left = `${50 + 50 * place * Math.sign(tau[i])}%`;
+      mark.style.left = `${50 + 50 * place * (tau[i] < 0 ? -1 : 1)}%`;
       value.title =
         limit === null ? "" : `${fixed((100 * Math.abs(tau[i])) / limit, 0)} % of the limit`;
     });

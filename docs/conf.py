@@ -1,0 +1,257 @@
+"""Sphinx's settings of dhkit's site; `make docs` builds it, and a warning is an error."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import sys
+from pathlib import Path
+
+from sphinx import addnodes
+from sphinx.ext.napoleon.docstring import NumpyDocstring
+from sphinx.transforms.post_transforms import SphinxPostTransform
+from sphinx.util import inspect as sphinx_inspect
+
+import dhkit
+from dhkit.cached_property import cached_property
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+from make_reference import existing_packages, exported, home_places  # noqa: E402
+
+project = "dhkit"
+author = "The dhkit developers"
+version = release = dhkit.__version__
+copyright = "The dhkit developers"
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["_build", "_generated", "examples", "llms.md"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+nitpicky = True
+
+# Pages: MyST Markdown, which GitHub renders too.
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+myst_links_external_new_tab = False
+
+# Mathematics: a vendored MathJax draws it, and asks for no network. The packages that load others are left out.
+mathjax_path = "mathjax/tex-svg.js"
+mathjax3_config = {
+    "tex": {"packages": {"[-]": ["autoload", "require"]}},
+    "options": {"enableMenu": False},
+    "svg": {"fontCache": "global"},
+}
+
+# The reference: from docstrings, whose types are the signatures'.
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True}
+autoclass_content = "class"
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 88
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_attr_annotations = False
+autosummary_generate = False
+
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+copybutton_only_copy_prompt_lines = True
+
+html_theme = "furo"
+html_title = "dhkit"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_extra_path = ["_generated/extra"]
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#1c4e9c", "color-brand-content": "#1c4e9c"},
+    "dark_css_variables": {"color-brand-primary": "#8fb6ff", "color-brand-content": "#8fb6ff"},
+    "navigation_with_keys": True,
+}
+pygments_style = "friendly"
+pygments_dark_style = "github-dark"
+
+
+def is_property(value: object) -> bool:
+    """Return whether a member is a property: dhkit has a cached one of its own."""
+    return _IS_PROPERTY(value) or isinstance(value, cached_property)
+
+
+_IS_PROPERTY = sphinx_inspect.isproperty
+sphinx_inspect.isproperty = is_property
+
+
+# A section of attributes is a list of names, several of which may share a line, without references.
+# The first line of an attribute's docstring is a sentence, and what stands before its colon is not a type.
+NumpyDocstring._parse_attributes_section = lambda self, section: self._format_fields(
+    "Attributes", self._consume_fields(prefer_type=False)
+)
+NumpyDocstring._parse_attribute_docstring = lambda self: self._dedent(self._consume_to_end())
+
+
+def homes() -> dict[str, str]:
+    """Return where a public name is documented, by every path under which dhkit exports it."""
+    found: dict[str, str] = {"dhkit.arm.Arm": "dhkit.Arm"}
+    places = home_places()
+    for package in existing_packages():
+        module = importlib.import_module(f"dhkit.{package}")
+        for name in exported(module):
+            home = places[package, name]
+            found[f"dhkit.{package}.{name}"] = home
+            found[f"dhkit.{name}"] = home
+            source = getattr(getattr(module, name), "__module__", None)
+            if isinstance(source, str):
+                found[f"{source}.{name}"] = home
+    return found
+
+
+def defined_names() -> set[str]:
+    """Return every name that dhkit's sources define, modules included, documented here or not."""
+    names = set()
+    for path in Path(dhkit.__file__).parent.rglob("*.py"):
+        names.add(path.parent.name if path.stem == "__init__" else path.stem)
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                names.add(node.name)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+    return names
+
+
+class FullNames(SphinxPostTransform):
+    """Give references to Python names the path under which the name is documented, before they are resolved."""
+
+    default_priority = 5
+
+    def run(self, **kwargs) -> None:
+        """Change the targets of a page's references."""
+        domain = self.env.get_domain("py")
+        for node in self.document.findall(addnodes.pending_xref):
+            if node.get("refdomain") == "py":
+                target = node["reftarget"].lstrip(".~")
+                if full := full_name(self.env, node, target, domain.objects):
+                    node["reftarget"] = full
+                # An ambiguous short name is not looked up in every class: Sphinx does so where this key exists.
+                node.attributes.pop("refspecific", None)
+
+
+def full_name(env, node, target: str, objects) -> str | None:
+    """Return the documented name that a reference means: of its class, its module, dhkit, or the only such one."""
+    module = node.get("py:module") or ""
+    owner = node.get("py:class") or ""
+    for name in (
+        f"{module}.{owner}.{target}",
+        f"{owner}.{target}",
+        f"{module}.{target}",
+        target,
+        env.homes.get(target, ""),
+        env.homes.get(f"{module}.{target}", ""),
+        env.homes.get(f"dhkit.{target}", ""),
+    ):
+        if name in objects and not objects[name].aliased:
+            return name
+    suffix = f".{target}"
+    found = {env.homes.get(name, name) for name in objects if name.endswith(suffix)}
+    found = {name for name in found if name in objects and not objects[name].aliased}
+    return found.pop() if len(found) == 1 else None
+
+
+def without_page(app, env, node, content):
+    """Leave a name without a page as text: types of other libraries, and names of dhkit's own sources.
+
+    A role that names nothing that is defined anywhere stays unresolved, which is a warning.
+    """
+    if node.get("refdomain") != "py":
+        return None
+    target = node["reftarget"].lstrip(".~")
+    is_annotation = any(isinstance(one, addnodes.desc_signature) for one in ancestors(node))
+    is_foreign = target.split(".")[0] in {
+        "numpy",
+        "enum",
+        "collections",
+        "typing",
+        "pathlib",
+        "fractions",
+    }
+    is_defined = target.rsplit(".", 1)[-1] in env.defined
+    return content if is_annotation or is_foreign or is_defined else None
+
+
+def ancestors(node):
+    """Yield the elements around a node."""
+    while node is not None:
+        yield node
+        node = node.parent
+
+
+def prepare(app, env):
+    """Index the names once, before references are resolved."""
+    env.homes = homes()
+    env.defined = defined_names()
+
+
+OUTSIDE = {"ARCHITECTURE.md": "architecture.md"}
+"""Files beside docs/ that the site includes, and their pages."""
+
+
+OPTIONAL = ("report", "install", "stability", "reference/report")
+"""Pages that a checkout may lack."""
+
+
+def with_own_pages(app, name: str, source: list[str]) -> None:
+    """Lead links to included files to their pages: GitHub has the files, the site the pages."""
+    depth = "../" * name.count("/")
+    for page in OPTIONAL:
+        if not any((HERE / f"{page}{suffix}").exists() for suffix in (".md", ".rst")):
+            path = (
+                page.removeprefix("reference/") if name.startswith("reference/") else f"../{page}"
+            )
+            source[0] = source[0].replace(f"\n{path}\n", "\n")
+    # A doctest needs an empty line after its last output; a reader does not.
+    source[0] = source[0].replace("\n\n```\n", "\n```\n")
+    for file, page in OUTSIDE.items():
+        source[0] = source[0].replace(f"](../{depth}{file})", f"]({depth}{page})")
+
+
+def with_own_links(app, name: str, parent: str, content: list[str]) -> None:
+    """Lead links inside an included file, which are relative to its own folder, to pages of the site."""
+    if str(parent) == "architecture":
+        content[0] = content[0].replace("](docs/", "](")
+
+
+LONG_TYPE = re.compile(
+    r"~?(?:numpy\.)?ndarray\[tuple\[~?(?:typing\.)?Any, (?:\.\.\.|…)\], "
+    r"~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]"
+)
+"""An array type of NumPy as Python evaluates it; the group is the type of its entries."""
+
+
+def with_short_types(app, what, name, value, options, signature, returns):
+    """Print the alias that the sources have instead of the type of NumPy that it stands for."""
+    return tuple(
+        text and LONG_TYPE.sub(r"NDArray[\1]", text).replace("NDArray[float64]", "Array")
+        for text in (signature, returns)
+    )
+
+
+def setup(app):
+    """Register the resolution of names."""
+    app.connect("autodoc-process-signature", with_short_types)
+    app.connect("source-read", with_own_pages)
+    app.connect("include-read", with_own_links)
+    app.connect("env-check-consistency", prepare)
+    app.connect("missing-reference", without_page)
+    app.add_post_transform(FullNames)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,261 @@
+"""Write the tables of docs/_generated from results of benchmarks and laws, and llms.txt from the pages."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import dhkit
+from dhkit import Arm
+
+HERE = Path(__file__).parent
+RESULTS = HERE.parent / "benchmarks" / "results"
+QUANTITIES = {
+    "fk": "forward kinematics",
+    "ik": "inverse kinematics",
+    "jacobian": "Jacobian",
+    "inverse_dynamics": "inverse dynamics",
+    "mass_matrix": "mass matrix",
+    "forward_dynamics": "forward dynamics",
+}
+ACCURACY = {
+    "kinematics": (
+        "closure of every branch",
+        "closure at a singularity",
+        "distance of the sets of solutions to EAIK's",
+        "closure",
+    ),
+    "model": ("Jacobian (world) against Pinocchio", "frame positions against Pinocchio"),
+    "dynamics": (
+        "M compiled against Pinocchio",
+        "C compiled against Pinocchio",
+        "g compiled against Pinocchio",
+        "tau compiled against Pinocchio",
+        "qdd compiled against Pinocchio",
+        "Mdot - 2 C, skew",
+        "dE/dt against qd . tau",
+    ),
+    "symbolic": ("exact M", "exact h", "exact g", "exact tau"),
+    "kernels": ("sine and cosine, ulp", "arc tangent, ulp"),
+    "planning": (
+        "velocity above its limit",
+        "torque above its limit",
+        "duration over toppra's",
+        "bang-bang: 2 sqrt(d / a)",
+        "effort: 12 d^2 / T^3",
+    ),
+    "grading": (
+        "slips that pass",
+        "right answers that are refused",
+        "false verdicts",
+        "share of mistakes that are not named",
+    ),
+}
+"""Quantities of laws that the page on accuracy lists, by the folder of their tests."""
+
+
+def read(name: str) -> dict[str, Any]:
+    """Return a results file."""
+    found: dict[str, Any] = json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
+    return found
+
+
+def duration(seconds: float) -> str:
+    """Return a time with three digits and its unit."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """Return a table in Markdown."""
+    titles = list(head)
+    lines = ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def machine(found: dict[str, Any]) -> str:
+    """Return a line on the machine and the versions of a run."""
+    about = found["machine"]
+    versions = ", ".join(f"{name} {value}" for name, value in about["packages"].items())
+    return f"{about['processor']}, {about['cores']} cores; {about['python']}; {versions}."
+
+
+def speed_rows(found: dict[str, Any], mode: str) -> Iterator[list[str]]:
+    """Yield a row for each contender of a mode, the fastest of each quantity in bold."""
+    for quantity, name in QUANTITIES.items():
+        rows = [row for row in found["rows"] if row["quantity"] == quantity and row["mode"] == mode]
+        rows = [row for row in rows if "out=" not in row["contender"]]
+        own = next((row["seconds"] for row in rows if row["own"]), None)
+        for k, row in enumerate(sorted(rows, key=lambda row: row["seconds"])):
+            is_fastest = row["seconds"] == min(other["seconds"] for other in rows)
+            time = duration(row["seconds"])
+            ratio = "" if own is None else f"{row['seconds'] / own:.2g}"
+            agrees = f"{row['error']:.0e}" if row["agrees"] else f"**{row['error']:.0e}**"
+            solutions = "" if row["solutions"] is None else f"{row['solutions']:.2f}"
+            yield [
+                name if k == 0 else "",
+                row["contender"],
+                f"**{time}**" if is_fastest else time,
+                ratio,
+                solutions,
+                agrees,
+            ]
+
+
+SPEED_HEAD = ("quantity", "contender", "time an item", "× dhkit", "solutions", "error")
+
+
+def speed_table(mode: str) -> str:
+    """Return the table of kinematics and dynamics of one mode."""
+    rows = [row for name in ("kinematics", "dynamics") for row in speed_rows(read(name), mode)]
+    return table(SPEED_HEAD, rows)
+
+
+def without_closed_form() -> str:
+    """Return the table of an arm without closed form: docs/peers_panda.json, by the command that its page names."""
+    found = json.loads((HERE / "peers_panda.json").read_text("utf-8"))
+    return table(SPEED_HEAD, speed_rows(found, "single")) + "\n" + machine(found) + "\n"
+
+
+def planning_table() -> str:
+    """Return the table of motions in least time."""
+    rows = [
+        [
+            f"{row['speed']:g}",
+            row["contender"],
+            f"{100 * (row['mean'] - 1):.2f} %",
+            f"{row['excess']:.0e}",
+            duration(row["seconds"]),
+        ]
+        for row in read("planning")["rows"]
+    ]
+    head = ("limits of speed ×", "contender", "longer than the best", "largest excess", "time")
+    return table(head, rows)
+
+
+def simulation_table() -> str:
+    """Return the table of simulated motions."""
+    rows = [
+        [
+            row["problem"],
+            row["contender"],
+            duration(row["timing"]["seconds"]),
+            f"{row['joint_error']:.0e}" if row["joint_error"] else "reference",
+        ]
+        for row in read("control")["integration"]
+    ]
+    batches = [
+        [
+            f"{row['arms']} arms, 1 s of computed torque",
+            row["contender"],
+            f"{duration(row['each']['seconds'])} a step and arm",
+            "" if row["difference"] is None else f"{row['difference']:.0e}",
+        ]
+        for row in read("control")["batch"]
+    ]
+    return table(("problem", "contender", "time", "largest joint error [rad]"), rows + batches)
+
+
+def derivation_table() -> str:
+    """Return the table of symbolic derivations."""
+    rows = [
+        [row["robot"], row["what"], duration(row["seconds"])]
+        for row in read("dynamics")["derivations"]
+    ]
+    return table(("robot", "derivation", "time"), rows)
+
+
+def comparison() -> dict[str, str]:
+    """Return the tables of the page on peers, by name."""
+    return {
+        "comparison-batch": speed_table("batch"),
+        "comparison-single": speed_table("single"),
+        "comparison-panda": without_closed_form(),
+        "comparison-planning": planning_table(),
+        "comparison-simulation": simulation_table(),
+        "comparison-derivations": derivation_table(),
+        "comparison-machine": machine(read("kinematics")),
+    }
+
+
+def accuracy() -> str:
+    """Return the table of laws: what was required, and the worst that was seen."""
+    laws = read("acceptance")["laws"]
+    rows = []
+    for folder, quantities in ACCURACY.items():
+        for quantity in quantities:
+            found = [
+                law
+                for law in laws
+                if law["law"].startswith(f"{folder}/") and law["quantity"] == quantity
+            ]
+            if not found:
+                raise LookupError(f"no law of {folder} has the quantity {quantity!r}")
+            rows.append(
+                [
+                    f"{folder}: {quantity}",
+                    str(len(found)),
+                    f"{max(law['samples'] for law in found):,}",
+                    f"{max(law['seen'] for law in found):.1e}",
+                    f"{found[0]['required']:g}",
+                ]
+            )
+    return table(("quantity", "cases", "samples a case", "worst seen", "allowed"), rows)
+
+
+def library() -> str:
+    """Return the table of the library's robots."""
+    rows = []
+    for name in dhkit.robots():
+        arm = Arm.load(name)
+        source = " ".join((arm.description.source or "").split())
+        rows.append([f"`{name}`", arm.description.kinds, arm.description.convention.value, source])
+    return table(("name", "joints", "table", "source"), rows)
+
+
+def title(path: Path) -> str:
+    """Return the first heading of a page."""
+    found = re.search(r"^# (.*)$", path.read_text("utf-8"), re.MULTILINE)
+    return found[1] if found else path.stem
+
+
+def llms() -> str:
+    """Return llms.txt: what dhkit is, its rules, and an index of the pages."""
+    intro = (HERE / "llms.md").read_text("utf-8")
+    lines = [intro.rstrip(), ""]
+    for folder in ("tutorials", "how-to", "explanation"):
+        lines += ["", f"## {title(HERE / folder / 'index.md')}"]
+        pages = sorted(path for path in (HERE / folder).glob("*.md") if path.stem != "index")
+        lines += [f"- [{title(path)}]({folder}/{path.stem}.html)" for path in pages]
+    lines += ["", "## Guides"]
+    lines += [
+        f"- [{title(path)}]({path.stem}.html)"
+        for path in sorted(HERE.glob("*.md"))
+        if path.stem not in {"index", "llms"}
+    ]
+    lines += ["", "## Arm, method by method"]
+    for name, member in vars(Arm).items():
+        if not name.startswith("_"):
+            about = getattr(member, "__func__", member).__doc__ or ""
+            lines.append(f"- `{name}`: {about.strip().splitlines()[0]}")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Write all tables."""
+    folder = HERE / "_generated"
+    (folder / "extra").mkdir(parents=True, exist_ok=True)
+    tables = {**comparison(), "accuracy": accuracy(), "library": library()}
+    for name, text in tables.items():
+        (folder / f"{name}.md").write_text(text, "utf-8")
+    (folder / "extra" / "llms.txt").write_text(llms(), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
