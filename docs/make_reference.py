@@ -112,7 +112,7 @@ ARM_SECTIONS = {
         "export_ik",
         "compile",
     ),
-    "Pictures": ("view",),
+    "Pictures and reports": ("view", "report"),
 }
 """Members of Arm on its page. Members that no section names stand in a last one."""
 

@@ -15,9 +15,11 @@ import shlex
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
+import nbformat
 import pytest
 
 import dhkit
@@ -60,7 +62,7 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs").symlink_to(DOCS)
     monkeypatch.setattr("webbrowser.open", lambda url: True)
-    monkeypatch.setattr("dhkit.cli.browser.time.sleep", press_ctrl_c)
+    monkeypatch.setattr("dhkit.cli.browser.time", SimpleNamespace(sleep=press_ctrl_c))
     names: dict[str, object] = {"__name__": "__main__"}
     for language, text in BLOCK.findall((ROOT / page).read_text("utf-8")):
         name = FILE_NAME.match(text)
@@ -186,6 +188,49 @@ def test_a_method_of_arm_explains_its_parameters_and_has_an_example(name):
     assert ">>> " in text, name
 
 
+def test_the_tutorials_are_notebooks_too():
+    made = documentation_module("make_notebooks")
+    pages = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
+    assert len(pages) == 12
+    for page in pages:
+        text = page.read_text("utf-8")
+        content = made.notebook(text)
+        nbformat.validate(content)
+        sources = [cell["source"] for cell in content["cells"] if cell["cell_type"] == "code"]
+        for source in sources:
+            ast.parse(source)
+        assert len(sources) == len(re.findall(r"^```python$", text, re.MULTILINE))
+
+
+def test_the_tables_are_made_of_the_results_of_benchmarks():
+    made = documentation_module("make_tables")
+    tables = made.comparison()
+    assert "pin.forwardKinematics" in tables["comparison-single"]
+    assert "roboticstoolbox ik_LM" in tables["comparison-panda"]
+    assert "toppra" in tables["comparison-planning"]
+    assert len(made.accuracy().splitlines()) == 2 + sum(map(len, made.ACCURACY.values()))
+    assert made.library().count("\n") == 2 + len(dhkit.robots())
+    assert made.duration(2.5e-8) == "25 ns"
+
+
+def test_llms_txt_names_every_method_of_arm():
+    text = documentation_module("make_tables").llms()
+    for name in vars(dhkit.Arm):
+        assert name.startswith("_") or f"- `{name}`: " in text, name
+
+
+def test_broken_links_of_the_site_are_found(tmp_path):
+    made = documentation_module("check_links")
+    (tmp_path / "one.html").write_text(
+        '<p id="here"><a href="two.html#there"></a><a href="#here"></a>'
+    )
+    (tmp_path / "two.html").write_text('<script src="https://cdn.example/x.js"></script>')
+    assert made.faults(tmp_path) == [
+        "one.html: two.html#there has no such anchor",
+        "two.html: loads https://cdn.example/x.js",
+    ]
+
+
 def test_the_modules_of_the_site_are_python():
     for path in DOCS.glob("*.py"):
         ast.parse(path.read_text("utf-8"))
@@ -210,7 +255,7 @@ def test_docs_names_the_folder_that_is_missing(tmp_path, capsys):
 
 def test_docs_ends_with_ctrl_c(tmp_path, monkeypatch, capsys):
     (tmp_path / "index.html").write_text("hello")
-    monkeypatch.setattr("dhkit.cli.browser.time.sleep", press_ctrl_c)
+    monkeypatch.setattr("dhkit.cli.browser.time", SimpleNamespace(sleep=press_ctrl_c))
     with pytest.raises(SystemExit) as exit:
         main(["docs", str(tmp_path), "--no-browser"])
     assert exit.value.code == 0

@@ -293,9 +293,8 @@ def test_the_command_writes_and_lists_its_files(tmp_path, capsys, monkeypatch):
 def test_equations_that_are_too_long_leave_their_values():
     """Seven joints at odd angles: M has more terms than the ring allows."""
     rng = np.random.default_rng(1)
-    rows = [
-        (0, *rng.uniform(0.1, 0.4, 2).round(2), rng.uniform(-1.5, 1.5).round(2)) for _ in range(7)
-    ]
+    sizes = rng.uniform([0.1, 0.1, -1.5], [0.4, 0.4, 1.5], (7, 3)).round(2)
+    rows = [(0, *map(float, row)) for row in sizes]
     arm = Arm.from_dh(rows, name="odd").with_uniform_links()
     content = article(arm)
     assert headings(content) == SECTIONS

@@ -10,6 +10,7 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.display import plain
 from dhkit.report.document import Formulas, Inline
+from dhkit.symbolic.equations.sentences import sentence_parts
 from dhkit.symbolic.equations.typst import Math, Row
 
 PROGRAMS = "programs"
@@ -18,8 +19,6 @@ LINE_WIDTH = 34.0
 """Width of a line of equations, em; a page has 38."""
 DIGITS = 4
 """Significant digits of rounded coefficients."""
-_SYMBOL = re.compile(r"\b(theta|q|A)_?(\d+|i|n)\b|\bphi\b")
-"""Symbols in words of derivations: theta2, theta_i, q2, q_i, A_1, phi."""
 _LONGEST_NAME = 80
 """Longest name of a robot that is shown, characters."""
 _LONGEST_SOURCE = 400
@@ -103,18 +102,7 @@ def words(text: str) -> tuple[Inline, ...]:
     >>> words("turn theta2 first")[1].latex
     '\\theta_{2}'
     """
-    parts: list[Inline] = []
-    at = 0
-    for match in _SYMBOL.finditer(text):
-        symbol = Math(r"\varphi", "phi")
-        if match[1] == "theta":
-            symbol = Math(rf"\theta_{{{match[2]}}}", f"theta_({match[2]})")
-        elif match[1]:
-            symbol = Math(f"{match[1]}_{{{match[2]}}}", f"{match[1]}_({match[2]})")
-        parts += [text[at : match.start()], symbol]
-        at = match.end()
-    parts.append(text[at:])
-    return tuple(part for part in parts if part)
+    return tuple(sentence_parts(text))
 
 
 def heading_words(text: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from html import escape
 
@@ -16,6 +15,7 @@ from dhkit.symbolic.equations.inverse_text import (
     rule_in_dollars,
 )
 from dhkit.symbolic.equations.inverse_writing import LATEX, Phrases, solved_before
+from dhkit.symbolic.equations.sentences import sentence_parts
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.steps import DerivationStep
 
@@ -27,13 +27,6 @@ svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: var(--pape
 .ik-step .display { padding-top: .25rem; padding-bottom: .25rem; } .ik-step p { margin: .35rem 0; }
 .ik-known { color: var(--faint); }
 </style>"""
-_NAME = r"(?:theta\d+|(?:theta|q)_i|phi|[pnoa][xyz]|r\d\d|[adq]\d|[sc]\d+)"
-_FACTOR = rf"(?:(?:abs|sqrt)\([^()]*\)|\b{_NAME}\b(?:\^2)?)"
-_FORMULA = re.compile(rf"{_FACTOR}(?: [-+=] (?:{_FACTOR}|\d+(?:\.\d+)?\b))*")
-"""A formula in a sentence: names, absolute values and roots, with signs between them."""
-_SUBSCRIPT = re.compile(r"\b(theta|phi|[a-z])_?(\d+|[xyzi])?\b")
-_CALL = re.compile(r"((?:abs|sqrt)\([^()]*\))")
-_LETTERS = {"theta": r"\theta", "phi": r"\varphi"}
 
 
 def inverse_page(derivation: InverseDerivation) -> str:
@@ -120,31 +113,7 @@ def _inline(latex: str) -> str:
 
 def _words(text: str) -> str:
     """Return words with formulas, such as px, abs(d3) and theta2, as MathML."""
-    parts = []
-    at = 0
-    for match in _FORMULA.finditer(text):
-        parts.append(escape(text[at : match.start()]))
-        parts.append(_inline(_formula_latex(match[0])))
-        at = match.end()
-    parts.append(escape(text[at:]))
-    return "".join(parts)
-
-
-def _formula_latex(formula: str) -> str:
-    """Return a formula of a sentence in LaTeX: ``abs(d3) - sqrt(px^2)`` with bars, roots and subscripts."""
-    parts = []
-    for part in _CALL.split(formula):
-        function, is_call, argument = part.partition("(")
-        inner = _SUBSCRIPT.sub(_name_latex, argument.removesuffix(")") if is_call else part)
-        if not is_call:
-            parts.append(inner)
-        elif function == "abs":
-            parts.append(rf"\left| {inner} \right|")
-        else:
-            parts.append(rf"\sqrt{{{inner}}}")
-    return "".join(parts)
-
-
-def _name_latex(match: re.Match[str]) -> str:
-    letter = _LETTERS.get(match[1], match[1])
-    return f"{letter}_{{{match[2]}}}" if match[2] else letter
+    return "".join(
+        escape(part) if isinstance(part, str) else _inline(part.latex)
+        for part in sentence_parts(text)
+    )

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dhkit.display import html_table
 from dhkit.symbolic.equations.inverse_writing import LATEX, TEXT, Phrases, phi_label, solved_before
 from dhkit.symbolic.equations.latex_document import escaped
+from dhkit.symbolic.equations.sentences import sentence_parts
 from dhkit.symbolic.equations.text import WIDTH, broken_lines
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.steps import Choice, DerivationStep
@@ -149,10 +150,10 @@ def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -
 def inverse_latex(derivation: InverseDerivation) -> str:
     """Return a derivation in LaTeX, for a page that loads amsmath."""
     write = Phrases(derivation, LATEX)
-    parts = [" ".join(escaped(sentence) for sentence in introduction(derivation))]
+    parts = [" ".join(_sentence(sentence) for sentence in introduction(derivation))]
     for step in derivation.steps:
-        title = f"${write.unknown(step.unknown)}$" if step.unknown else escaped(step.title)
-        parts += [rf"\subsection*{{{title}}}", escaped(step.look)]
+        title = f"${write.unknown(step.unknown)}$" if step.unknown else _sentence(step.title)
+        parts += [rf"\subsection*{{{title}}}", _sentence(step.look)]
         displays = [
             (write.name(definition.name), write.element(definition.element))
             for definition in step.definitions
@@ -169,9 +170,9 @@ def inverse_latex(derivation: InverseDerivation) -> str:
                 _latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}.")
             )
         if step.nothing:
-            parts.append(escaped(f"No solution where {step.nothing}."))
+            parts.append(_sentence(f"No solution where {step.nothing}."))
         if step.singular:
-            parts.append(escaped(f"Singular where {step.singular}."))
+            parts.append(_sentence(f"Singular where {step.singular}."))
     joints = [f"{name} &= {value}" for name, value in write.joint_values()]
     if joints:
         parts += [
@@ -180,10 +181,10 @@ def inverse_latex(derivation: InverseDerivation) -> str:
         ]
     for condition in derivation.conditions:
         sides = f"{write.element(condition.left)} &= {write.element(condition.right)}"
-        parts += [escaped(condition.look), f"\\begin{{align*}}\n{sides}\n\\end{{align*}}"]
+        parts += [_sentence(condition.look), f"\\begin{{align*}}\n{sides}\n\\end{{align*}}"]
     parts += [
-        escaped(branches_sentence(derivation)),
-        *(escaped(f"Note: {note}.") for note in derivation.notes),
+        _sentence(branches_sentence(derivation)),
+        *(_sentence(f"Note: {note}.") for note in derivation.notes),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -206,3 +207,11 @@ def _latex_sentence(text: str) -> str:
     """Return a sentence whose formulas stand between dollar signs in LaTeX."""
     parts = text.split("$")
     return "$".join(part if k % 2 else escaped(part) for k, part in enumerate(parts))
+
+
+def _sentence(text: str) -> str:
+    """Return a sentence of words and formulas in LaTeX."""
+    return "".join(
+        escaped(part) if isinstance(part, str) else f"${part.latex}$"
+        for part in sentence_parts(text)
+    )
