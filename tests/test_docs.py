@@ -43,6 +43,8 @@ FILE_NAME = re.compile(r"(?:#|%|//) ([\w-]+\.(?:py|toml|m|c|csv))\n")
 OTHER_COMMANDS = {"make", "pip", "git", "source", "ros2", "colcon", "octave", "gcc", "python"}
 """Programs in console blocks that are not dhkit's; such lines are shown and not run."""
 SLOW_PAGES = {
+    "docs/report.md",
+    "docs/how-to/without-pinocchio.md",
     "docs/tutorials/08-trajectories.md",
     "docs/tutorials/09-control.md",
     "docs/tutorials/11-own-robot.md",

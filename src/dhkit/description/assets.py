@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 
 from dhkit.description.bounds import BOUNDS
@@ -77,6 +78,8 @@ def inside(
         return None
     file = folder / parts
     try:
+        with suppress(FileNotFoundError):  # a mesh may be missing
+            file.stat()  # refuses a loop of links, which `resolve` does not from Python 3.13 on
         leaves_folder = not file.resolve().is_relative_to(folder.resolve())
     except (OSError, RuntimeError):  # a loop of links, or a name that no file can have
         raise DescriptionError(f"{subject} is {path[:80]!r}, which cannot be found") from None
