@@ -28,6 +28,7 @@ from dhkit import (
     model,
     planning,
     programs,
+    report,
     symbolic,
     trajectories as motions,
 )
@@ -64,6 +65,7 @@ PACKAGES = (
     "planning",
     "execution",
     "programs",
+    "report",
     "symbolic",
     "trajectories",
     "verification",
@@ -297,6 +299,8 @@ def long_sum():
 VALUES = {
     dhkit.Arm: puma,
     dhkit.View: lambda: dhkit.View(planar().description),
+    # report
+    report.Report: lambda: report.Report(Path("out/report.pdf"), (Path("out/report.pdf"),), 21),
     # bench
     bench.BenchReport: timed,
     bench.Contender: lambda: bench.Contender(
