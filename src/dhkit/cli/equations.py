@@ -39,6 +39,8 @@ from dhkit.symbolic.equations import (
     readable,
     rounded,
 )
+from dhkit.symbolic.equations.quantities import elements_of
+from dhkit.symbolic.ring import Element
 
 MAX_TITLE_LENGTH = 200
 Source: TypeAlias = Lagrangian | SymbolicKinematics
@@ -177,7 +179,7 @@ def equations(
 
 def _to_digits(shown: list[Quantity], digits: int | None) -> tuple[list[Quantity], list[str]]:
     """Return quantities with numbers of so many digits, and a note that says so; None decides by their length."""
-    is_long = any(_is_long(quantity) for quantity in shown)
+    is_long = any(_is_long(element) for element in elements_of(shown))
     if digits is None:
         digits = DEFAULT_DIGITS if is_long else 0
     if not digits:
@@ -186,11 +188,10 @@ def _to_digits(shown: list[Quantity], digits: int | None) -> tuple[list[Quantity
     return [rounded(quantity, digits) for quantity in shown], [note]
 
 
-def _is_long(quantity: Quantity) -> bool:
+def _is_long(element: Element) -> bool:
     """Return whether a coefficient has more digits than a floating-point number."""
     return any(
         max(abs(coefficient.numerator), coefficient.denominator) > 10**FLOAT_DIGITS
-        for element in quantity.elements.flat
         for coefficient in element.terms.values()
     )
 
@@ -213,7 +214,7 @@ def _shorter_by_base_parameters(
 
 
 def _term_count(shown: Sequence[Quantity]) -> int:
-    return sum(len(element) for quantity in shown for element in quantity.elements.flat)
+    return sum(len(element) for element in elements_of(shown))
 
 
 def _inverse(description: Description, form: str, output: Path | None, json: bool) -> None:

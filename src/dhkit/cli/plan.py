@@ -355,6 +355,8 @@ def _print(
     say(f"some limit reached in {100 * certificate.any_active:.0f} % of the time: {active_text}")
     if report.unlimited:
         say(f"not limited: {', '.join(report.unlimited)}")
+    if report.collisions_not_asked_for:
+        say(f"collisions not looked for: {report.collisions_not_asked_for}")
     if report.slow_down > 1:
         say(f"slowed down by {100 * (report.slow_down - 1):.3g} % to keep its limits between knots")
     if report.tightened:

@@ -114,6 +114,17 @@ class PlanReport:
     """Whether the clearance is reduced during the whole motion: none was found that keeps it away from the ends."""
 
     @property
+    def collisions_not_asked_for(self) -> str:
+        """Bodies whose contact nobody asked to avoid, in words; empty if obstacles and links were both asked for."""
+        asked = self.clear_of if self.clearance is not None else ""
+        missing = []
+        if "obstacles" not in asked:
+            missing.append("with obstacles")
+        if "links" not in asked:
+            missing.append("between links")
+        return ", ".join(missing)
+
+    @property
     def sensitivity(self) -> float | None:
         """Relative excess of the cost on half as many intervals over this one."""
         return None if self.coarse is None else self.coarse[1] / self.cost - 1
@@ -215,6 +226,8 @@ class PlanReport:
         ]
         if self.unlimited:
             facts.append(("not limited", ", ".join(self.unlimited)))
+        if self.collisions_not_asked_for:
+            facts.append(("collisions not looked for", self.collisions_not_asked_for))
         if self.slow_down > 1:
             facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.3g} %"))
         if self.coarse is not None:
@@ -338,6 +351,8 @@ class PlanReport:
         )
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
+        if self.collisions_not_asked_for:
+            lines.append(f"collisions not looked for: {self.collisions_not_asked_for}")
         lines += self.notes
         if self.coarse is not None:
             more = more_text(self.sensitivity or 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,6 +61,12 @@ def number(value: float, digits: int = 4) -> str:
     return f"{value:.{digits}g}".replace("-", "−").replace("e+0", "e").replace("e−0", "e−")
 
 
+def with_minus_signs(cells: Iterable[str]) -> Iterator[str]:
+    """Yield numbers as text with minus signs instead of hyphens."""
+    for cell in cells:
+        yield cell.replace("-", "−")
+
+
 def number_math(value: float, digits: int = 4) -> Math:
     """Return a number as a formula: 1.2e-5 is 1.2 times 10 to the power of -5."""
     text = number(value, digits).replace("−", "-")
@@ -77,12 +84,14 @@ def matrix_row(head: Math, array: Array, digits: int = 4) -> Row:
     table = table.reshape(len(table), -1)
     largest = float(np.abs(table).max(initial=0.0))
     clean = np.where(np.abs(table) < 1e-12 * max(largest, 1e-300), 0.0, table)
-    cells = []
+    latex_rows = []
+    typst_rows = []
     for row in clean:
-        line = [number_math(value, digits) for value in row]
-        cells.append(line)
-    latex = " \\\\\n".join(" & ".join(cell.latex for cell in row) for row in cells)
-    typst = "; ".join(", ".join(cell.typst for cell in row) for row in cells)
+        cells = [number_math(value, digits) for value in row]
+        latex_rows.append(" & ".join(cell.latex for cell in cells))
+        typst_rows.append(", ".join(cell.typst for cell in cells))
+    latex = " \\\\\n".join(latex_rows)
+    typst = "; ".join(typst_rows)
     return Row(
         head,
         Math(f"\\begin{{pmatrix}}\n{latex}\n\\end{{pmatrix}}", f'mat(delim: "(", {typst})'),

@@ -158,14 +158,18 @@ def _rows(formulas: Formulas) -> str:
     return " \\\n  ".join(lines)
 
 
+def _table_row(cells: Sequence[Inline]) -> str:
+    return ", ".join(f"[{_inline((cell,))}]" for cell in cells)
+
+
 def _table(table: Table) -> str:
     names = {"l": "left", "r": "right"}
     columns = ", ".join(names[table.alignment(k)] for k in range(table.width))
     cells = []
     if table.headings:
-        heads = ", ".join(f"[{_inline((cell,))}]" for cell in table.headings)
+        heads = _table_row(table.headings)
         cells.append(f"table.header({heads}), table.hline(stroke: 0.6pt)")
-    cells += [", ".join(f"[{_inline((cell,))}]" for cell in row) for row in table.rows]
+    cells += [_table_row(row) for row in table.rows]
     body = (
         f"table(columns: {table.width}, align: ({columns},), stroke: none, inset: (x: 5pt, y: 3.2pt), "
         "table.hline(stroke: 0.8pt),\n  " + ",\n  ".join(cells) + ",\n  table.hline(stroke: 0.8pt))"

@@ -17,7 +17,7 @@ from dhkit.report.pictures import figure_block
 from dhkit.report.sections.dynamics import dynamics_section
 from dhkit.report.sections.kinematics import table_block
 from dhkit.report.sections.robot import moved, ready
-from dhkit.report.words import Attachments, joint_values, name_of, number
+from dhkit.report.words import Attachments, joint_values, name_of, number, with_minus_signs
 from dhkit.trajectories import Trajectory, quintic
 
 CONTROLLERS = ("pd-gravity", "pid", "computed-torque")
@@ -206,10 +206,7 @@ def _comparison(description: Description, motion: Motion) -> Iterator[Block]:
     headings, rows = compared.rows()
     yield Table(
         tuple(headings),
-        tuple(
-            tuple(cell.replace("-", "−") if k else cell for k, cell in enumerate(row))
-            for row in rows
-        ),
+        tuple((row[0], *with_minus_signs(row[1:])) for row in rows),
         "Errors of the joint that errs most, the tool's largest error, and the largest torque as a share of the limits",
         "lrrrrr",
     )

@@ -319,7 +319,9 @@ def _equations(description: Description, lag: Lagrangian, program: str) -> Itera
     missing = [name for name in ("M", "C", "g") if name not in best.names]
     if best.shown:
         what = _listed(best.names)
-        exact = [element for name in best.names for element in getattr(best.lag, name).flat]
+        exact: list[Element] = []
+        for name in best.names:
+            exact += getattr(best.lag, name).flat
         digits = f", rounded to {DIGITS} digits" if has_long_numbers(exact) else ""
         yield Paragraph(f"{what} {best.words}{digits}, in SI units:")
     for _, rows in best.shown:

@@ -27,6 +27,7 @@ from dhkit.report.words import (
     joint_values,
     matrix_row,
     name_of,
+    with_minus_signs,
 )
 from dhkit.symbolic import SymbolicKinematics, symbolic_kinematics
 from dhkit.symbolic.equations import Quantity, kinematic_quantities, rounded
@@ -150,7 +151,7 @@ def table_block(description: Description, subject: str) -> Table:
         headings.append(Math(f"{latex}_{{{index}}}{latex_unit}", f"{typst}_({index}){typst_unit}"))
     return Table(
         tuple(headings),
-        tuple((row[0], *(cell.replace("-", "−") for cell in row[1:])) for row in table.rows),
+        tuple((row[0], *with_minus_signs(row[1:])) for row in table.rows),
         f"Denavit-Hartenberg table of {subject}, {table.convention.value} convention",
         "lrrrr",
     )
