@@ -90,7 +90,8 @@ def test_a_link_that_touches_an_obstacle_is_named(open_lab):
 def plan(lab, kind="least-time"):
     lab.answer("joints.set", {"q": START})
     lab.answer("motion.plan", {"kind": kind, "goal": {"q": GOAL}})
-    wait_for(lambda: lab._motions.motion is not None or (states(lab)["job"] or {}).get("error"))
+    # The state is published last.
+    wait_for(lambda: states(lab)["motion"] is not None or (states(lab)["job"] or {}).get("error"))
     return states(lab)
 
 
