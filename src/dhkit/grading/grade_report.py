@@ -355,7 +355,9 @@ class GradeReport:
         for diagnosis in self.diagnosis:
             lines.append(f"{diagnosis.place}: {diagnosis.sentence}")
             lines += [f"second hint: {diagnosis.second_hint}"] if diagnosis.second_hint else []
-        lines += [f"{entry.name}: {entry.statement}" for entry in self.unfinished]
+        unreadable = [entry for entry in self.entries if entry.verdict is Verdict.UNREADABLE]
+        told = (*unreadable, *self.unfinished)
+        lines += [f"{entry.name}: {entry.statement}" for entry in told if entry.statement]
         return lines + ([f"missing: {self.missing_text}"] if self.missing else [])
 
     @property

@@ -51,8 +51,9 @@ def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
     entries = []
     for entry in report.entries:
         shown = replace(entry, difference=None, difference_latex="", witness=None)
-        # The statement on a wrong entry may say by how much it is wrong.
-        if not (hints and entry.verdict.passes):
+        # The statement on a wrong entry may say by how much it is wrong; why one cannot be read gives nothing away.
+        is_harmless = entry.verdict.passes or entry.verdict is Verdict.UNREADABLE
+        if not (hints and is_harmless):
             shown = replace(shown, statement="")
         entries.append(shown if hints else replace(shown, latex="", follows=""))
     return replace(
