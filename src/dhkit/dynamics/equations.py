@@ -179,6 +179,7 @@ def inverse_dynamics(
     ValueError, TypeError
         An argument of another shape, or not numeric; ``out`` does not fit.
     """
+    # M qdd + h = tau + load  with  load = J^T wrench - friction,  so  tau = (M qdd + h) - load.
     load = external_torque(description, q, qd, wrench, friction, threads)
     states = {"q": q, "qd": qd, "qdd": qdd}
     if load is None:

@@ -39,12 +39,15 @@ def interpolated(
     qd: ArrayLike | None,
     qdd: ArrayLike | None,
 ) -> tuple[Array, Array]:
-    """Return breaks and coefficients; see :meth:`dhkit.trajectories.Trajectory.from_samples`."""
+    """Return breaks from t = 0 on, and coefficients: of a spline, or of Hermite pieces where rates are given.
+
+    See :meth:`dhkit.trajectories.Trajectory.from_samples`.
+    """
     from scipy.interpolate import CubicSpline
 
     t = check_times(times)
     if qd is None and qdd is not None:
-        raise ValueError("qdd is given without qd; expected both or neither")
+        raise ValueError("qdd is given without qd; expected qd too")
     count = len(t)
     q = _rows(description, q, "q", count)
     qd = None if qd is None else _rows(description, qd, "qd", count)
