@@ -5,6 +5,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -204,6 +205,11 @@ def test_long_decimals_are_rounded_unless_all_are_asked_for(dhkit, tmp_path):
     assert status == 0
     assert re.search(r"^M11 = 0\.\d{5,7}$", text, re.MULTILINE)
     assert "--digits 0 prints them exactly" in text
+    for form in ("latex", "html"):  # whoever has the file alone learns it too
+        dhkit(str(file), "--what", "M", "--format", form, "--output", f"page.{form}")
+        assert "rounded to 6 significant digits" in Path(f"page.{form}").read_text("utf-8")
+    _, facts, _ = dhkit(str(file), "--what", "M", "--json")
+    assert "rounded to 6 significant digits" in json.loads(facts)["notes"][-1]
     _, exact, _ = dhkit(str(file), "--what", "M", "--digits", "0")
     assert re.search(r"^M11 = 0\.\d{30,}$", exact, re.MULTILINE)
     _, symbolic, _ = dhkit("planar2r", "--what", "M")

@@ -14,7 +14,7 @@ from dhkit.cli.options import Json, Robot, Uniform, load_arm
 from dhkit.cli.output import print_json, report_files
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
-from dhkit.errors import DescriptionError, DhkitError
+from dhkit.errors import DescriptionError
 from dhkit.symbolic import (
     Lagrangian,
     SymbolicKinematics,
@@ -45,6 +45,8 @@ from dhkit.symbolic.ring import Element
 MAX_TITLE_LENGTH = 200
 Source: TypeAlias = Lagrangian | SymbolicKinematics
 """Object that has the exact quantities."""
+Printer: TypeAlias = Callable[[Any, Sequence[Quantity], Sequence[str]], str]
+"""Printer of a source's quantities with notes."""
 
 INVERSE = "ik"
 """The quantity that stands for the derivation of inverse kinematics."""
@@ -52,10 +54,6 @@ CODE = ("python", "c", "matlab")
 DEFAULT_DIGITS = 6
 """Significant digits of equations whose numbers have more than a floating-point number."""
 FLOAT_DIGITS = 17
-LONG = 200
-"""Terms of equations that are long."""
-MUCH_SHORTER = 5
-"""Ratio of terms for which base parameters are recommended."""
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -158,34 +156,35 @@ def equations(
     else:
         lag = derived = _lagrangian_of(arm.description, symbols, base)
         shown = list((quantities if form in CODE else readable)(derived, what))
-    notes: list[str] = []
+    rounding: tuple[str, ...] = ()
     if form not in CODE:
-        shown, notes = _to_digits(shown, digits)
-        notes += _shorter_by_base_parameters(arm.description, shown, base, what)
+        shown, rounding = _to_digits(shown, digits)
     elif digits is not None:
         raise DescriptionError(f"--digits: {form} has all digits; leave it out")
+    notes = (*lag.notes, *rounding)
     if output is not None:
-        files = _write(lag, shown, form, output)
+        files = _write(lag, shown, notes, form, output)
         report_files(files, json=json)
         return
-    text = FORMATS[form](lag, shown)
-    if form == "text":
-        text += "".join(f"note: {note}\n" for note in notes)
+    text = FORMATS[form](lag, shown, notes)
     if json:
-        print_json(_facts(lag, shown, form, text))
+        print_json(_facts(lag, shown, notes, form, text))
     else:
         sys.stdout.write(text)
 
 
-def _to_digits(shown: list[Quantity], digits: int | None) -> tuple[list[Quantity], list[str]]:
+def _to_digits(shown: list[Quantity], digits: int | None) -> tuple[list[Quantity], tuple[str, ...]]:
     """Return quantities with numbers of so many digits, and a note that says so; None decides by their length."""
     is_long = any(_is_long(element) for element in elements_of(shown))
     if digits is None:
         digits = DEFAULT_DIGITS if is_long else 0
     if not digits:
-        return shown, []
-    note = f"numbers are rounded to {digits} significant digits; --digits 0 prints them exactly"
-    return [rounded(quantity, digits) for quantity in shown], [note]
+        return shown, ()
+    note = (
+        f"numbers are rounded to {digits} significant digits; --digits 0 prints them exactly, "
+        "--base-parameters prints symbols instead"
+    )
+    return [rounded(quantity, digits) for quantity in shown], (note,)
 
 
 def _is_long(element: Element) -> bool:
@@ -194,27 +193,6 @@ def _is_long(element: Element) -> bool:
         max(abs(coefficient.numerator), coefficient.denominator) > 10**FLOAT_DIGITS
         for coefficient in element.terms.values()
     )
-
-
-def _shorter_by_base_parameters(
-    description: Description, shown: Sequence[Quantity], base: bool, what: str
-) -> list[str]:
-    """Return a note where base parameters make long equations much shorter."""
-    terms = _term_count(shown)
-    if base or terms < LONG:
-        return []
-    try:
-        shorter = readable(base_parameters(description).lagrangian, what)
-    except DhkitError:
-        return []
-    count = _term_count(shorter)
-    if terms < MUCH_SHORTER * count:
-        return []
-    return [f"--base-parameters prints {count} terms instead of {terms}"]
-
-
-def _term_count(shown: Sequence[Quantity]) -> int:
-    return sum(len(element) for element in elements_of(shown))
 
 
 def _inverse(description: Description, form: str, output: Path | None, json: bool) -> None:
@@ -260,7 +238,9 @@ def _inverse(description: Description, form: str, output: Path | None, json: boo
         sys.stdout.write(text)
 
 
-def _write(lag: Source, shown: Sequence[Quantity], form: str, output: Path) -> list[Path]:
+def _write(
+    lag: Source, shown: Sequence[Quantity], notes: Sequence[str], form: str, output: Path
+) -> list[Path]:
     """Write a file, or for MATLAB a file for each function into a folder; return the paths."""
     if output.suffix == ".toml":
         raise DescriptionError(
@@ -276,33 +256,41 @@ def _write(lag: Source, shown: Sequence[Quantity], form: str, output: Path) -> l
         if output.is_dir():
             raise DescriptionError(f"{output} is a folder; expected the name of a file")
         check_place(output)
-        contents = {output: FORMATS[form](lag, shown)}
+        contents = {output: FORMATS[form](lag, shown, notes)}
     for path, text in contents.items():
         write_atomically(path, text)
     return list(contents)
 
 
-def _text(lag: Source, shown: Sequence[Quantity]) -> str:
-    notes = "".join(f"note: {note}\n" for note in lag.notes)
-    return f"{equations_text(shown)}\n{notes}"
+def _text(lag: Source, shown: Sequence[Quantity], notes: Sequence[str]) -> str:
+    lines = "".join(f"note: {note}\n" for note in notes)
+    return f"{equations_text(shown)}\n{lines}"
 
 
-def _latex(lag: Source, shown: Sequence[Quantity]) -> str:
-    return latex_document(equations_latex(shown), lag.description.name[:MAX_TITLE_LENGTH])
+def _latex(lag: Source, shown: Sequence[Quantity], notes: Sequence[str]) -> str:
+    document = latex_document(equations_latex(shown), lag.description.name[:MAX_TITLE_LENGTH])
+    return "".join(f"% note: {note}\n" for note in notes) + document
 
 
-FORMATS: Mapping[str, Callable[[Any, Sequence[Quantity]], str]] = {
+def _code(printer: Callable[[Any, Sequence[Quantity]], str]) -> Printer:
+    """Return the printer of a language, which writes the notes of the source itself."""
+    return lambda lag, shown, notes: printer(lag, shown)
+
+
+FORMATS: Mapping[str, Printer] = {
     "text": _text,
     "latex": _latex,
-    "python": equations_python,
-    "c": equations_c,
-    "matlab": equations_matlab,
+    "python": _code(equations_python),
+    "c": _code(equations_c),
+    "matlab": _code(equations_matlab),
     "html": equations_page,
 }
-"""Printers of equations, by the name of the format."""
+"""Printers of equations with their notes, by the name of the format."""
 
 
-def _facts(lag: Source, shown: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
+def _facts(
+    lag: Source, shown: Sequence[Quantity], notes: Sequence[str], form: str, text: str
+) -> dict[str, Any]:
     term_counts = {}
     for quantity in shown:
         term_counts[quantity.name] = [len(element) for element in quantity.elements.flat]
@@ -313,5 +301,5 @@ def _facts(lag: Source, shown: Sequence[Quantity], form: str, text: str) -> dict
         "text": text,
         "terms": term_counts,
         "constants": lag.constants,
-        "notes": list(lag.notes),
+        "notes": list(notes),
     }

@@ -54,8 +54,13 @@ KINEMATIC_EQUATION = r"T = T_{\mathrm{base}}\, A_{1} A_{2} \cdots A_{n}\, T_{\ma
 EQUATION_OF_MOTION = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
 
 
-def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
-    """Return a page with the robot's table, quantities, the values of constants, and notes."""
+def equations_page(
+    lag: Lagrangian | SymbolicKinematics,
+    quantities: Sequence[Quantity],
+    notes: Sequence[str] | None = None,
+) -> str:
+    """Return a page with the robot's table, quantities, the values of constants, and notes (the source's by default)."""
+    notes = lag.notes if notes is None else notes
     description = lag.description
     is_dynamics = any(quantity.name in QUANTITIES for quantity in quantities)
     subject = "equations of motion" if is_dynamics else "kinematics"
@@ -69,7 +74,7 @@ def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Qu
         *_constants(lag, quantities),
         *(
             f'<p class="note">{escape(note)}</p>'
-            for note in [*lag.notes, *renamings(_elements(quantities))]
+            for note in [*notes, *renamings(_elements(quantities))]
         ),
     ]
     return html_page(f"{description.name}: {subject}", "\n".join(part for part in body if part))
