@@ -10,6 +10,7 @@ from typing import Any
 
 import dhkit
 from dhkit import Arm
+from dhkit.bench.benchmark_report import duration
 
 HERE = Path(__file__).parent
 RESULTS = HERE.parent / "benchmarks" / "results"
@@ -61,14 +62,6 @@ def read(name: str) -> dict[str, Any]:
     """Return a results file."""
     found: dict[str, Any] = json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
     return found
-
-
-def duration(seconds: float) -> str:
-    """Return a time with three digits and its unit."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

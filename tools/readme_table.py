@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from dhkit.bench.benchmark_report import duration
 from dhkit.description import write_atomically
 
 ROOT = Path(__file__).parents[1]
@@ -33,10 +34,10 @@ def speed_table() -> str:
         own = [row for row in rows if row["own"]]
         peers = [row for row in rows if not row["own"]]
         cells = [
-            _time(_fastest(own, "batch")),
+            duration(_fastest(own, "batch")["seconds"]),
             # Where a peer has no call for batches, its calls in a loop count.
             _named(min(peers, key=lambda row: float(row["seconds"]))),
-            _time(_fastest(own, "single")),
+            duration(_fastest(own, "single")["seconds"]),
             _named(_fastest(peers, "single")),
         ]
         lines.append(f"| {name} | {' | '.join(cells)} |")
@@ -64,16 +65,8 @@ def _fastest(rows: list[dict[str, Any]], mode: str) -> dict[str, Any]:
     return min((row for row in rows if row["mode"] == mode), key=lambda row: float(row["seconds"]))
 
 
-def _time(row: dict[str, Any]) -> str:
-    seconds = float(row["seconds"])
-    for unit, size in (("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds / 1e-9:.0f} ns"
-
-
 def _named(row: dict[str, Any]) -> str:
-    return f"{_time(row)} ({row['contender']})"
+    return f"{duration(row['seconds'])} ({row['contender']})"
 
 
 def with_table(readme: str) -> str:

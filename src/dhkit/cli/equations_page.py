@@ -59,7 +59,7 @@ def equations_page(
     quantities: Sequence[Quantity],
     notes: Sequence[str] | None = None,
 ) -> str:
-    """Return a page with the robot's table, quantities, the values of constants, and notes (the source's by default)."""
+    """Return a page with the robot's table, quantities, values of constants, and notes (the source's by default)."""
     notes = lag.notes if notes is None else notes
     description = lag.description
     is_dynamics = any(quantity.name in QUANTITIES for quantity in quantities)

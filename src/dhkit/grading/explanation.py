@@ -13,6 +13,7 @@ from dhkit.description import Description
 from dhkit.errors import DescriptionError
 from dhkit.grading.reports.html import STYLE
 from dhkit.grading.reports.mathml import mathml
+from dhkit.page_style import page
 from dhkit.symbolic import InverseDerivation, Lagrangian, inverse_derivation, lagrangian
 from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
@@ -100,12 +101,7 @@ def explanation_html(description: Description) -> str:
     if inverse is not None:
         body.append(f"<h1>{html.escape(description.name)}: inverse kinematics, step by step</h1>")
         body.append(inverse._repr_html_())
-    title = f"{html.escape(description.name)}: worked solution"
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{STYLE}</style></head>\n'
-        f"<body>{''.join(body)}</body></html>\n"
-    )
+    return page(f"{description.name}: worked solution", "".join(body), STYLE)
 
 
 def _inverse(description: Description) -> InverseDerivation | None:

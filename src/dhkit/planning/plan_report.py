@@ -12,6 +12,7 @@ from dhkit.description import Array
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
+from dhkit.planning.certificate.collision_avoidance import BETWEEN_LINKS, FROM_OBSTACLES
 from dhkit.planning.criteria import Limit, States, cost_of
 from dhkit.planning.program import Task, Work
 from dhkit.planning.search import PlannedMotion
@@ -118,10 +119,10 @@ class PlanReport:
         """Bodies whose contact nobody asked to avoid, in words; empty if obstacles and links were both asked for."""
         asked = self.clear_of if self.clearance is not None else ""
         missing = []
-        if "obstacles" not in asked:
+        if FROM_OBSTACLES not in asked:
             missing.append("with obstacles")
-        if "links" not in asked:
-            missing.append("between links")
+        if BETWEEN_LINKS not in asked:
+            missing.append(BETWEEN_LINKS)
         return ", ".join(missing)
 
     @property

@@ -12,7 +12,7 @@ from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.reports import sentences
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.reports.sentences import plain, points, points_of
-from dhkit.page_style import PAGE_STYLE
+from dhkit.page_style import PAGE_STYLE, page
 
 _BADGES = {
     Verdict.CORRECT: ("right", "✓"),
@@ -65,14 +65,9 @@ def html_class(reports: Sequence[GradeReport], marks: Sequence[Marks], title: st
 
 
 def _page(title: str, body: str) -> str:
-    """Return a page around a body that is HTML already."""
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{_text(title, 200)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{_text(title, 200)}</h1>\n"
-        f"{body}\n</body>\n</html>\n"
-    )
+    """Return a page with its title as heading around a body that is HTML already."""
+    shown = plain(title, 200)
+    return page(shown, f"<h1>{escape(shown)}</h1>\n{body}", STYLE, _POLICY)
 
 
 def _sections(report: GradeReport, marks: Marks) -> Iterator[str]:

@@ -39,6 +39,9 @@ from dhkit.planning.obstacles import (
 from dhkit.planning.second_check import Claim
 from dhkit.trajectories import Limits
 
+FROM_OBSTACLES = "from obstacles"
+BETWEEN_LINKS = "between links"
+"""Bodies that a motion is kept clear of, in words of reports."""
 BETWEEN = 0.1
 """Share of the clearance by which a distance may fall below it between two states of a certificate."""
 MIN_BETWEEN = 1e-3
@@ -148,9 +151,9 @@ class CollisionAvoidance:
             return {}
         clear_of = []
         if self.obstacles:
-            clear_of.append("from obstacles")
+            clear_of.append(FROM_OBSTACLES)
         if self.self_collision:
-            clear_of.append("between links")
+            clear_of.append(BETWEEN_LINKS)
         reduced = (*self.reduced, *self._reduced_by_shapes)
         return {
             "clearance": self.clearance,

@@ -6,6 +6,7 @@ import base64
 from collections.abc import Iterator, Sequence
 from html import escape
 
+from dhkit.page_style import MATH_STYLE, page
 from dhkit.report.document.tree import (
     Block,
     Code,
@@ -32,13 +33,7 @@ h1 { font-size: 1.7rem; text-align: center; line-height: 1.25; } h2 { font-size:
 h3 { font-size: 1.08rem; margin: 1.4rem 0 .4rem; } .byline { text-align: center; font-style: italic; color: #57606a; }
 .prompt { font-style: italic; color: #57606a; border-left: 3px solid #c4ccd4; padding-left: .8rem; margin: .6rem 0; }
 .display { overflow-x: auto; overflow-y: hidden; padding: .4rem 0; }
-math { font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math", math; }
-math[display="block"] { width: fit-content; margin: 0 auto; }
-mtd { padding: .15em .35em; } mtable[columnspacing] mtd { padding: .25em 0; }
-mtd[columnalign="left"] { text-align: left; }
-mtd[columnalign="right"] { text-align: right; } mo.bracket { display: none; }
-mtable.matrix { border: solid currentColor; border-width: 0 1.5px; border-radius: .9em / 50%; padding: .2em .5em;
-                margin-left: .35em; }
+math { font-size: 1em; } math[display="block"] { margin: 0 auto; } mtd { padding: .15em .35em; }
 figure { margin: 1.2rem 0; text-align: center; } figure img { max-width: 100%; height: auto; }
 .row { display: flex; gap: .8rem; justify-content: center; } .row > div { flex: 1; font-size: .85rem; }
 figcaption, caption { font-size: .9rem; color: #3a424c; caption-side: top; text-align: left; padding-bottom: .3rem; }
@@ -68,14 +63,7 @@ def html_text(document: Document) -> str:
     numbers = _Numbers()
     for block in document.blocks:
         body += _block(block, numbers)
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(document.title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(body)
-        + "\n</body>\n</html>\n"
-    )
+    return page(document.title, "\n".join(body), MATH_STYLE + _STYLE, _POLICY)
 
 
 class _Numbers:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from html import escape
 
-from dhkit.page_style import PAGE_STYLE, font_style
+from dhkit.page_style import PAGE_STYLE, font_style, page
 
 _EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
 _MATRIX = re.compile(
@@ -29,9 +28,5 @@ def equation_mathml(latex: str) -> str:
 
 
 def html_page(title: str, body: str) -> str:
-    """Return a page with a title around a body of HTML."""
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{font_style()}{PAGE_STYLE}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
-    )
+    """Return a page of formulas, with the font for them, around a body of HTML."""
+    return page(title, body, font_style() + PAGE_STYLE)

@@ -23,9 +23,9 @@ _STYLE = """<style>
 .ik-step { display: flow-root; }
 .ik-step svg.figure { float: right; max-width: 100%; height: auto; margin: 0 0 .5rem 1.5rem; }
 svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: var(--paper, #fff); stroke-width: 4px; }
-.ik-step .solution { background: var(--tint); border-left: 3px solid var(--mark); }
+.ik-step .solution { background: var(--tint, #f3f6fa); border-left: 3px solid var(--mark, #0b5cad); }
 .ik-step .display { padding-top: .25rem; padding-bottom: .25rem; } .ik-step p { margin: .35rem 0; }
-.ik-known { color: var(--faint); }
+.ik-known { color: var(--faint, #57606a); }
 </style>"""
 
 
