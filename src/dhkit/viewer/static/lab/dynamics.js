@@ -5,6 +5,8 @@ import { fixed, h } from "./dom.js";
 import { FollowingPanel } from "./following.js";
 import { formula } from "./formula.js";
 
+const FACTS = ["half axes [m/s], joint rates of norm 1", "manipulability", "condition number"];
+
 export class DynamicsPanel extends FollowingPanel {
   constructor(lab, root) {
     super(lab, "dynamics.read");
@@ -26,8 +28,7 @@ export class DynamicsPanel extends FollowingPanel {
       },
       "Velocity ellipsoid",
     );
-    this.facts = [h("td"), h("td"), h("td")];
-    this.factNames = this.facts.map(() => h("th", { scope: "row" }));
+    this.facts = FACTS.map(() => h("td"));
     this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
     root.append(
       this.note,
@@ -45,7 +46,7 @@ export class DynamicsPanel extends FollowingPanel {
         h(
           "tbody",
           {},
-          this.facts.map((value, k) => h("tr", {}, this.factNames[k], value)),
+          FACTS.map((name, k) => h("tr", {}, h("th", { scope: "row" }, name), this.facts[k])),
         ),
       ),
     );
@@ -130,12 +131,11 @@ export class DynamicsPanel extends FollowingPanel {
       .map((x) => fixed(x, 3))
       .join(", ");
     const facts = [
-      ["half axes [m/s], joint rates of norm 1", axes],
-      ["manipulability", manipulability.toPrecision(3)],
-      ["condition number", condition === null ? "infinite: singular" : condition.toPrecision(3)],
+      axes,
+      manipulability.toPrecision(3),
+      condition === null ? "infinite: singular" : condition.toPrecision(3),
     ];
-    facts.forEach(([, text], k) => (this.facts[k].textContent = text));
-    this.factNames.forEach((name, k) => (name.textContent = facts[k][0]));
+    facts.forEach((text, k) => (this.facts[k].textContent = text));
   }
 
   build(bodies) {
