@@ -220,7 +220,8 @@ def _clear_heads(
         side = 1.0 if high >= -low else -1.0
         begin = min(side * low, side * high)
         far = max(side * low, side * high)
-        front = begin - _HEAD_GAP * _extent_behind(links, joints, T_last_tool, i, side)
+        back = _extent_behind(links, joints, T_last_tool, i, side)
+        front = begin - _HEAD_GAP * back
         rise = min(0.0, front - joint.half)
 
         # A stroke that goes far past the link, or begins on the axis of the joint before, really passes through it.
