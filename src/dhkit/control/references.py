@@ -105,7 +105,7 @@ class Step:
     duration: float | None = None
 
     def __post_init__(self) -> None:
-        _make_finite(self, "before", "after", "time")
+        _check_fields(self, "before", "after", "time")
 
     @property
     def jumps(self) -> tuple[float, ...]:
@@ -139,7 +139,7 @@ class Sine:
     duration: float | None = None
 
     def __post_init__(self) -> None:
-        _make_finite(self, "centre", "amplitude", "frequency", "phase")
+        _check_fields(self, "centre", "amplitude", "frequency", "phase")
 
     def sampled(self, t: Array) -> Samples:
         """Return joint values, rates and accelerations at times (N,), shape (N, n) each.
@@ -160,13 +160,13 @@ class Sine:
     __repr__ = value_line
 
 
-def _make_finite(reference: object, *names: str) -> None:
-    """Convert fields to arrays.
+def _check_fields(reference: object, *names: str) -> None:
+    """Convert the fields of a frozen reference to arrays, and check that they are finite and fit together.
 
     Raises
     ------
     ValueError
-        A field that is not finite.
+        A field that is not finite, or shapes that do not broadcast.
     TypeError
         A field that is not numeric.
     """
@@ -181,8 +181,8 @@ def _make_finite(reference: object, *names: str) -> None:
     try:
         np.broadcast_shapes(*shapes)
     except ValueError:
-        listed = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
-        raise ValueError(f"{type(reference).__name__}: {listed} do not fit together") from None
+        fields = ", ".join(f"{name} {shape}" for name, shape in zip(names, shapes, strict=True))
+        raise ValueError(f"{type(reference).__name__}: {fields} do not fit together") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +205,7 @@ class _Motion:
 
 def reference_of(
     description: Description,
-    reference: Reference | Trajectory | ArrayLike,
+    reference: Reference | Trajectory | str | ArrayLike,
     q0: ArrayLike | None = None,
 ) -> Reference:
     """Return a reference: as given, or made from a trajectory, or from a configuration or a pose to hold.
@@ -215,7 +215,8 @@ def reference_of(
     description
         The robot.
     reference
-        A :class:`Reference`, a motion, joint values (n,), or a pose of the tool in the world (4, 4).
+        A :class:`Reference`; a motion; joint values (n,); the name of a pose of the robot's file, such as ``"ready"``;
+        or a pose of the tool in the world (4, 4).
     q0
         Joint values, shape (n,), rad and m, to which those that hold a pose are nearest; the middle of the joint limits
         unless given.
@@ -223,7 +224,8 @@ def reference_of(
     Raises
     ------
     ValueError
-        A trajectory of another robot, a matrix that is not a pose, or a configuration that is not (n,) and finite.
+        A trajectory of another robot, an unknown name, a matrix that is not a pose, or a configuration that is not (n,)
+        and finite.
     UnreachableError
         A pose that the arm does not reach inside its limits.
     TypeError

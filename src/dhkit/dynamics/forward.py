@@ -54,15 +54,24 @@ def forward_dynamics(
         A link without a body; joints that carry no inertia at any state.
     ValueError, TypeError
         An argument of another shape, or not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> forward_dynamics(arm, [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]).round(3)  # released from the horizontal
+    array([-25.898,  37.67 ])
     """
     load = external_torque(description, q, qd, wrench, friction, threads)
     q = joint_array(description, q, "q")
     qd = joint_array(description, qd, "qd")
     tau = joint_array(description, tau, "tau")
     if out is not None and np.may_share_memory(out, q):
-        q = q.copy()  # out= may overwrite q, which is needed to explain a missing acceleration
-    drive = tau if load is None else tau + load
-    states = {"q": q, "qd": qd, "tau": drive}
+        # out= may overwrite q, which is needed below to explain an acceleration that is NaN.
+        q = q.copy()
+    # M qdd + h = tau + load
+    total_torque = tau if load is None else tau + load
+    states = {"q": q, "qd": qd, "tau": total_torque}
     qdd = evaluate("forward_dynamics", description, states, (description.n,), out, threads)
 
     # The sum finds a NaN in one pass; only then its cause is looked for.
@@ -75,11 +84,21 @@ def forward_dynamics(
 def require_inertia(description: Description) -> None:
     """Check that an arm's mass matrix is regular at some state, and with couplings positive definite at all.
 
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+
     Raises
     ------
     DescriptionError
         A link without a body; joints that carry no inertia at any state, or couplings that are too large. The message
         names them, and a remedy.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> require_inertia(library_robot("planar2r"))
     """
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SINGULAR_SAMPLES, description.n))
     M = mass_matrix(description, q)

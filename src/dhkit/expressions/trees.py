@@ -14,14 +14,16 @@ T = TypeVar("T")
 
 
 class Algebra(ABC, Generic[T]):
-    """Operations on the values of a tree: numbers, intervals, elements of a ring, text.
+    """Arithmetic in which trees are evaluated: of numbers, intervals, elements of a ring, or text.
 
-    A part that occurs more than once is evaluated once: CasADi's graphs share parts.
+    A subclass says what each operation gives; :meth:`of` applies them to a tree. A part that occurs more than once is
+    evaluated once, since the trees of CasADi's graphs share parts. Values are kept by the ``id`` of their part: the
+    caller keeps the trees alive as long as the algebra.
     """
 
     def __init__(self) -> None:
         self.shared: dict[int, T] = {}
-        """Values of the parts met so far, by their ids."""
+        """Values of the parts evaluated so far, by their ids."""
 
     def of(self, tree: Tree) -> T:
         """Return the value of a tree, worked out from its parts to the whole."""
@@ -41,9 +43,9 @@ class Algebra(ABC, Generic[T]):
             case Power():
                 return self.power(tree)
             case Product(factors):
-                return self.product([(is_factor, self.of(factor)) for is_factor, factor in factors])
+                return self.product([(is_multiplied, self.of(x)) for is_multiplied, x in factors])
             case Sum(terms):
-                return self.sum([(added, self.of(term)) for added, term in terms])
+                return self.sum([(is_added, self.of(x)) for is_added, x in terms])
 
     @abstractmethod
     def number(self, tree: Number) -> T:
@@ -55,11 +57,11 @@ class Algebra(ABC, Generic[T]):
 
     @abstractmethod
     def call(self, tree: Call) -> T:
-        """Return the value of a call; :meth:`of` has those of its arguments, unless they are not values here."""
+        """Return the value of a call, whose arguments' values :meth:`of` gives."""
 
     @abstractmethod
     def power(self, tree: Power) -> T:
-        """Return the value of a power; :meth:`of` has that of its base, and of its exponent where it may be any."""
+        """Return the value of a power, whose base's value :meth:`of` gives; algebras may restrict the exponent."""
 
     @abstractmethod
     def product(self, factors: Sequence[tuple[bool, T]]) -> T:
@@ -92,16 +94,12 @@ def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
         case Power():
             return replace(tree, base=children[0], exponent=children[1])
         case Product(parts):
-            return Product(
-                tuple(
-                    (is_factor, child)
-                    for (is_factor, _), child in zip(parts, children, strict=True)
-                )
-            )
+            # A factor is multiplied (True) or divided by (False), a term is added or subtracted: that stays.
+            is_multiplied = [sign for sign, _ in parts]
+            return Product(tuple(zip(is_multiplied, children, strict=True)))
         case Sum(parts):
-            return Sum(
-                tuple((added, child) for (added, _), child in zip(parts, children, strict=True))
-            )
+            is_added = [sign for sign, _ in parts]
+            return Sum(tuple(zip(is_added, children, strict=True)))
     return tree
 
 

@@ -20,8 +20,13 @@ _OPTIMIZATION = 2
 _ALIGNMENT = 64
 """Alignment of a block's rows, bytes."""
 _SIGNATURE = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64
+    None,
+    ctypes.c_void_p,  # parameters: double[p]
+    ctypes.c_void_p,  # arrays: addresses of the inputs and then the outputs, each [items][size]
+    ctypes.c_void_p,  # work: double[sum of sizes][BLOCK], where a block's inputs and outputs are transposed
+    ctypes.c_int64,  # number of items
 )
+"""The C function ``void kernel(double *parameters, void **arrays, double *work, int64_t items)``."""
 
 
 @cache
@@ -76,49 +81,60 @@ class CompiledFunction:
         if not place:
             raise RuntimeError("object code without a function named kernel")
         self._function = _SIGNATURE(place)
-        self._alone: Stages | None = None
-        """Stages for single items."""
+        self._single_item: Stages | None = None
+        """Arrays for single items, made at the first one."""
 
     def __call__(
         self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
     ) -> None:
         """Fill ``outputs``; all are arrays (N, size), C-contiguous."""
-        count = len(inputs[0])
-        if count == 1:
-            stages = self._alone or self._stages(parameters, inputs, outputs)
-            stages.work(1, parameters, inputs, outputs)
+        items = len(inputs[0])
+        if items == 1:
+            # Looking up addresses and allocating the work array takes longer than one item: it is copied into arrays
+            # whose addresses are already known (a stage), and its results are copied out.
+            if self._single_item is None:
+                self._single_item = self._stages(parameters, inputs, outputs)
+            self._single_item.work(1, parameters, inputs, outputs)
             return
         for array in (*inputs, *outputs):
             # The machine code does not check its pointers.
-            if not array.flags.c_contiguous or len(array) != count:
+            if not array.flags.c_contiguous or len(array) != items:
                 raise ValueError(
                     f"a kernel was given an array of shape {array.shape} and strides {array.strides}"
                 )
-        self._call(np.ascontiguousarray(parameters), [*inputs, *outputs])()
+        run = self._bind(np.ascontiguousarray(parameters), [*inputs, *outputs])
+        run()
 
     def _stages(
         self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
     ) -> Stages:
-        """Return stages for single items of arrays such as these."""
-        sizes = [array.shape[1] for array in inputs]
-        kinds = [(array.shape[1], array.dtype) for array in outputs]
+        """Return stages whose arrays have the sizes and types of these."""
+        input_sizes = [array.shape[1] for array in inputs]
+        output_types = [(array.shape[1], array.dtype) for array in outputs]
+        parameter_shape = parameters.shape
 
-        def staged(items: int) -> Stage:
-            own = np.zeros(parameters.shape)
-            read = [np.zeros((items, size)) for size in sizes]
-            written: list[NDArray[Any]] = [np.zeros((items, size), kind) for size, kind in kinds]
-            return Stage(own, read, written, self._call(own, [*read, *written]))
+        def new_stage(items: int) -> Stage:
+            stage_parameters = np.zeros(parameter_shape)
+            stage_inputs = [np.zeros((items, size)) for size in input_sizes]
+            stage_outputs: list[NDArray[Any]] = [
+                np.zeros((items, size), dtype) for size, dtype in output_types
+            ]
+            run = self._bind(stage_parameters, [*stage_inputs, *stage_outputs])
+            return Stage(stage_parameters, stage_inputs, stage_outputs, run)
 
-        self._alone = Stages(staged)
-        return self._alone
+        return Stages(new_stage)
 
-    def _call(self, parameters: Array, arrays: Sequence[NDArray[Any]]) -> Callable[[], object]:
-        """Return a call of the function with these arrays, which it keeps."""
+    def _bind(self, parameters: Array, arrays: Sequence[NDArray[Any]]) -> Callable[[], object]:
+        """Return the function bound to these arrays, which it reads and writes each time it is called.
+
+        The machine code knows addresses alone: the bound function keeps the arrays alive, also the work array that no
+        other object refers to.
+        """
         work = aligned(sum(array.shape[1] for array in arrays) * BLOCK, _ALIGNMENT)
         addresses = np.array([address(array) for array in arrays], dtype=np.uintp)
+        arguments = (address(parameters), address(addresses), address(work), len(arrays[0]))
         kept = (parameters, arrays, addresses, work)
-        places = (address(parameters), address(addresses), address(work), len(arrays[0]))
-        return lambda function=self._function, kept=kept: function(*places)  # type: ignore[misc]
+        return lambda function=self._function, kept=kept: function(*arguments)  # type: ignore[misc]
 
 
 @cache

@@ -1,4 +1,8 @@
-"""Arrays at fixed addresses for single items and small blocks; passing new addresses would take longer."""
+"""Stages: arrays at fixed addresses, into which single items and small blocks are copied.
+
+Looking up the addresses of new arrays takes longer than copying a few numbers, so that a compiled function keeps arrays
+whose addresses it already has, one set for each thread and number of items.
+"""
 
 from __future__ import annotations
 

@@ -61,6 +61,16 @@ def boundaries(description: Description) -> tuple[Boundary, ...]:
     Limits of revolute joints are ignored. Without limits of a prismatic joint there is no outer boundary.
     The result is empty if no boundaries are known in closed form, or if the first joint is prismatic.
 
+    Parameters
+    ----------
+    description
+        The arm.
+
+    Returns
+    -------
+    tuple[Boundary, ...]
+        The boundaries; empty if none is known.
+
     Examples
     --------
     >>> from dhkit.description import library_robot

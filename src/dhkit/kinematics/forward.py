@@ -37,6 +37,15 @@ def forward_kinematics(
     ------
     ValueError, TypeError
         q has not shape (..., n) or is not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> forward_kinematics(arm, [0.0, 0.0])[:3, 3]
+    array([0.9, 0. , 0. ])
+    >>> forward_kinematics(arm, [[0.0, 0.0], [0.1, 0.2]]).shape
+    (2, 4, 4)
     """
     run, parameters = tool_kernel(description)
     return fill(run, parameters, [joint_array(description, q)], (4, 4), out, threads)
@@ -63,6 +72,11 @@ def frames(
     -------
     Array
         Shape (..., n+1, 4, 4), m.
+
+    Raises
+    ------
+    ValueError, TypeError
+        q has not shape (..., n) or is not numeric; ``out`` does not fit.
 
     Examples
     --------
@@ -104,5 +118,7 @@ def _frames_graph(description: Description) -> Graph:
 
     table, parameters = SymbolicTable.parametric(description)
     q = joint_symbols("q", description.n)
+    # CasADi's matrices are stored by columns, NumPy's arrays by rows: Graph.of takes care of it, so that the frames
+    # below each other, shape (4 (n + 1), 4), come out as (n + 1, 4, 4).
     stacked = casadi.vertcat(*table.world_to_frames(q))
     return Graph.of("frames", {"parameters": parameters, "q": q}, {"T": stacked})

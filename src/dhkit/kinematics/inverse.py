@@ -64,6 +64,17 @@ def inverse_kinematics(
         and what to use.
     ValueError, TypeError
         T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, world_to_tool
+    >>> arm = library_robot("puma560")
+    >>> T = world_to_tool(arm, [0.1, 0.4, -0.8, 0.3, 0.5, 0.2])
+    >>> solutions = inverse_kinematics(arm, T)
+    >>> solutions.q.shape, int(solutions.valid.sum())
+    ((8, 6), 8)
+    >>> solutions.nearest([0, 0, 0, 0, 0, 0]).round(3)
+    array([ 0.1,  0.4, -0.8,  0.3,  0.5,  0.2])
     """
     check_whole("threads", threads, 1)
     poses = pose_rows(T)
@@ -155,6 +166,15 @@ def inverse_kinematics_in_chunks(
     ------
     ModelError, ValueError, TypeError
         As for :func:`inverse_kinematics`; ``size`` is below 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dhkit.description import library_robot, world_to_tool
+    >>> arm = library_robot("puma560")
+    >>> T = world_to_tool(arm, np.random.default_rng(0).uniform(-1, 1, (1000, 6)))
+    >>> sum(int(found.valid.any(axis=-1).sum()) for rows, found in inverse_kinematics_in_chunks(arm, T, 300))
+    1000
     """
     check_whole("size", size, 1)
     poses = pose_rows(T)

@@ -50,6 +50,17 @@ def jacobian(
     ------
     ValueError, TypeError
         q has not shape (..., n); another frame; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> jacobian(library_robot("planar2r"), [0.0, 0.0]).round(3)
+    array([[0. , 0. ],
+           [0.9, 0.4],
+           [0. , 0. ],
+           [0. , 0. ],
+           [0. , 0. ],
+           [1. , 1. ]])
     """
     _check_frame(frame)
     run, parameters = jacobian_kernel(description, frame)
@@ -85,6 +96,14 @@ def jacobian_dot(
     ------
     ValueError, TypeError
         As for :func:`jacobian`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> jacobian_dot(library_robot("planar2r"), [0.0, 0.0], [1.0, 0.0])[:3].round(3)
+    array([[-0.9, -0.4],
+           [ 0. ,  0. ],
+           [ 0. ,  0. ]])
     """
     _check_frame(frame)
     run, parameters = jacobian_dot_kernel(description, frame)

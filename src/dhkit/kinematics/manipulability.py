@@ -212,6 +212,16 @@ def freedoms(description: Description, motion: Motion = "translational") -> int:
         Rows of the Jacobian that are used: ``"translational"``, ``"rotational"`` or ``"whole"``, which
         mixes m and rad.
 
+    Returns
+    -------
+    int
+        0 to 3; to 6 for ``"whole"``.
+
+    Raises
+    ------
+    ValueError
+        Another motion.
+
     Examples
     --------
     >>> from dhkit.description import library_robot
@@ -247,6 +257,13 @@ def velocity_ellipsoid(
     ------
     ValueError, TypeError
         q has not shape (..., n); another motion.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> ellipsoid = velocity_ellipsoid(library_robot("planar2r"), [0.0, 1.0])
+    >>> ellipsoid.lengths.round(3)  # half axes, m/s; the third is across the plane
+    array([0.865, 0.195, 0.   ])
     """
     if motion not in ("translational", "rotational"):
         raise ValueError(f"motion is {motion!r}; expected 'translational' or 'rotational'")

@@ -123,6 +123,15 @@ def follow_path(
         T has not shape (N, 4, 4), or q0 not (n,) or not finite.
     ModelError
         The arm has no closed form, and ssik is not installed or does not take it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dhkit.description import library_robot, pose
+    >>> arm = library_robot("planar2r")
+    >>> T = np.array([pose((x, 0.5, 0)) for x in np.linspace(0.2, 0.5, 4)])
+    >>> follow_path(arm, T, [0.0, 1.0])
+    <IKPath of 4 poses: 0 switches, 0 lost, 0 near a singularity>
     """
     poses = pose_rows(T)
     if poses.ndim != 3:

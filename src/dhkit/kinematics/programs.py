@@ -17,7 +17,24 @@ from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbo
 
 @takes_robot
 def kinematic_kernels(description: Description) -> list[Kernel]:
-    """Return the kernels of frames, Jacobians, their derivatives, and numeric and closed-form inverse kinematics."""
+    """Return the kernels of frames, Jacobians, their derivatives, and numeric and closed-form inverse kinematics.
+
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    list[Kernel]
+        The kernels that ``arm.compile`` compiles; one for closed-form inverse kinematics only where the arm has it.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> len(kinematic_kernels(library_robot("puma560")))
+    11
+    """
     with_parameters = [
         tool_kernel(description),
         frames_kernel(description),
@@ -64,6 +81,13 @@ def export_kinematics(
         ``name`` is not an identifier of C.
     OSError
         The folder cannot be written to.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> source, header = export_kinematics(library_robot("puma560"), ".", "puma")
+    >>> source.name, header.name
+    ('puma.c', 'puma.h')
     """
     name = description.name if name is None else name
     graphs = [_forward(description, name), _jacobian(description, name)]

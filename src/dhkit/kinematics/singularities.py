@@ -97,6 +97,16 @@ class Singularities:
 def singularities(description: Description) -> Singularities:
     """Return the singularities of an arm in closed form.
 
+    Parameters
+    ----------
+    description
+        The arm.
+
+    Returns
+    -------
+    Singularities
+        Conditions by kind, in words and as functions of q.
+
     Raises
     ------
     ModelError
@@ -152,6 +162,13 @@ def measures(description: Description, q: ArrayLike) -> dict[str, Array]:
         See :func:`singularities`.
     ValueError
         q has not shape (..., n).
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("puma560")
+    >>> {kind: float(value.round(4)) for kind, value in measures(arm, [0.1, 0.4, -0.8, 0.3, 0.0, 0.2]).items()}
+    {'shoulder': 0.3427, 'elbow': 0.6623, 'wrist': 0.0}
     """
     q = joint_array(description, q)
     return {factor.kind: factor.measure(q) for factor in singularities(description).factors}
@@ -170,6 +187,18 @@ def determinant(description: Description, q: ArrayLike) -> Array:
         The arm.
     q
         Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    Array
+        Shape (...), SI: for a six-joint arm of revolute joints m^3.
+
+    Raises
+    ------
+    ModelError
+        No closed form is known for this arm.
+    ValueError
+        q has not shape (..., n).
 
     Examples
     --------
@@ -213,6 +242,13 @@ def singular_configurations(
         See :func:`singularities`; or the arm has no such singularity.
     ValueError
         Another kind.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> q = singular_configurations(library_robot("puma560"), "wrist", 3)
+    >>> q.shape, q[:, 4].round(9)
+    ((3, 6), array([0., 0., 0.]))
     """
     factor = _factor(description, kind)
     lower, upper = _ranges(description)

@@ -98,7 +98,7 @@ def solve_in_closed_form(
         )
         # A single call has no time to look for others.
         is_one_in_reach = count == 1 and distance.item() == 0.0
-        if fit.ring is not None and fit.parameters["offset"] and not is_one_in_reach:
+        if fit.wrist_distances is not None and fit.parameters["offset"] and not is_one_in_reach:
             # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
             beyond = np.flatnonzero(distance.reshape(count) > 0)
             if beyond.size:
@@ -125,7 +125,7 @@ def free_angles(
         return np.zeros((*batch, 2))
     start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
     try:
-        joints = joint_array(description, start, "seed")[..., [0, fit.free or 0]]
+        joints = joint_array(description, start, "seed")[..., [0, fit.free_joint or 0]]
         angles = np.broadcast_to(joints, (*batch, 2))
     except ValueError:
         raise ValueError(

@@ -175,6 +175,22 @@ def tool_reach(description: Description) -> float:
     """Return the tool's greatest distance from the first joint's axis inside the limits, m, over 5,000 random states.
 
     ``description.reach`` is an upper bound of another distance: the sum of all lengths.
+
+    Parameters
+    ----------
+    description
+        The arm.
+
+    Returns
+    -------
+    float
+        m; the largest of the sampled distances, a lower bound of the exact one.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> round(tool_reach(library_robot("planar2r")), 3)
+    0.9
     """
     lower, upper, _ = _ranges(description)
     q = lower + (upper - lower) * np.random.default_rng(0).random(
@@ -213,6 +229,11 @@ def workspace(
         How many threads share the kinematics.
     progress
         Called now and then; an exception in it ends the work.
+
+    Returns
+    -------
+    Workspace
+        Positions and manipulability of all samples, the occupied grid, and estimates of size.
 
     Raises
     ------

@@ -39,7 +39,10 @@ class ElementName(NamedTuple):
 
 
 class UrdfWarning(NamedTuple):
-    """An unusual element of a URDF, and how it was read; the text follows the element's name directly."""
+    """An unusual element of a URDF, and how it was read.
+
+    It prints as the element and its text, which brings its own first space or sign: ``joint 'elbow': no limits``.
+    """
 
     element: ElementName
     text: str
@@ -182,7 +185,10 @@ class UrdfTree:
     unconnected: tuple[str, ...] = ()
 
     def joints_to(self, link: str, base: str | None = None) -> tuple[UrdfJoint, ...] | None:
-        """Return the joints from a base (the root if not given) to a link; None if the base is not on that path."""
+        """Return the joints from a base (the root if not given) to a link; None if the base is not on that path.
+
+        Every link has one parent joint, so that the path is followed from the link to the base, and then reversed.
+        """
         end = self.root if base is None else base
         joints = []
         while link != end:

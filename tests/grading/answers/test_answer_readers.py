@@ -10,6 +10,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import read
 from dhkit.expressions.syntax import Token
 from dhkit.expressions.trees import node_count
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.computer_algebra import from_mathematica, is_mathematica
 from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.documents.latex_rows import matrix_rows, rows_of
@@ -183,3 +184,12 @@ def test_time_derivatives_count_their_nodes():
     assert node_count(tree, 100) == node_count(tree, node_count(tree, 100))
     with pytest.raises(AnswerError, match="an acceleration, qdd1"):
         time_derivative(read("qdd1"))
+
+
+def test_as_many_macros_as_the_bound_are_read():
+    names = [f"x{chr(97 + i // 26)}{chr(97 + i % 26)}" for i in range(BOUNDS.macros + 1)]
+    definitions = [rf"\newcommand{{\{name}}}{{y}}" for name in names]
+    accepted = "\n".join([*definitions[:-1], *definitions[:3], "$g_1 = m_1$"])
+    assert len(list(document_statements(accepted))) == 1
+    with pytest.raises(AnswerError, match=f"more than {BOUNDS.macros} macros"):
+        list(document_statements("\n".join([*definitions, "$g_1 = m_1$"])))

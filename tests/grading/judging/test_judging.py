@@ -121,8 +121,8 @@ def test_coordinates_are_inverse_and_relative_ones_change_nothing():
     absolute = Coordinates.absolute(exact_arm(ARM, "file"))
     assert np.array_equal(absolute.B @ absolute.S, np.eye(2))
     assert absolute.sums == ((0,), (0, 1))
-    assert Coordinates.relative(2).in_own_angles("c12") == "c12"
-    assert absolute.in_own_angles("c12 + s2") == "cos(q2) + sin(q2 - q1)"
+    assert Coordinates.relative(2).in_student_angles("c12") == "c12"
+    assert absolute.in_student_angles("c12 + s2") == "cos(q2) + sin(q2 - q1)"
 
 
 def test_c_is_judged_by_rows():

@@ -172,7 +172,7 @@ def test_a_stretched_arm_whose_wrist_is_nearly_straight_is_reached(name, elbow, 
 @pytest.mark.parametrize("name", SIX_JOINTS)
 def test_the_free_joint_of_a_straight_wrist_comes_from_the_seed_or_is_zero(name):
     arm = library_robot(name)
-    free = classify(arm).fit.free
+    free = classify(arm).fit.free_joint
     q = singular_configurations(arm, "wrist", 500, seed=3)
     others = [value for key, value in singularity_measures(arm, q).items() if key != "wrist"]
     q = q[np.min(others, axis=0) > 0.05]

@@ -20,8 +20,11 @@ from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
 _PIECE = re.compile(
-    r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL
+    r"\s*(?:\\(?P<macro>[A-Za-z]+|.)|(?P<number>\d+\.?\d*|\.\d+)|(?P<letters>[A-Za-z]+)|(?P<sign>\S))",
+    re.ASCII | re.DOTALL,
 )
+r"""One piece of a formula: a macro such as \theta or \, (without the backslash), a number, letters or a sign."""
+
 _MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
 """A number in front of a fraction, which is not a subscript or exponent."""
 SPACE_NAMES = word_set(
@@ -94,28 +97,29 @@ class _LatexReader:
         return _PIECE.match(self.text, self.at)
 
     def _next_is(self, sign: str) -> bool:
+        """Whether the next piece is this sign."""
         piece = self._peek()
-        return piece is not None and piece[4] == sign
+        return piece is not None and piece["sign"] == sign
 
     def _until(self, closing: str) -> list[Token]:
         """Read up to a closing brace, or to the end."""
         tokens: list[Token] = []
-        while (piece := self._peek()) is not None and piece[4] != "}":
-            is_sum_going_on = self._goes_on_with_a_sum(piece, tokens)
+        while (piece := self._peek()) is not None and piece["sign"] != "}":
+            continues_sum = self._continues_sum(piece, tokens)
             item = self._item(piece)
-            tokens += item[1:-1] if is_sum_going_on else item
+            tokens += item[1:-1] if continues_sum else item
         if closing:
             if not self._next_is(closing):
                 fail(self.text, min(self.at, len(self.text) - 1), f"expected {closing!r}")
             self.at = self.text.index(closing, self.at) + 1
         return self._over(tokens)
 
-    def _goes_on_with_a_sum(self, piece: re.Match[str], before: list[Token]) -> bool:
+    def _continues_sum(self, piece: re.Match[str], before: list[Token]) -> bool:
         """Whether a group in braces begins with a sign after an operand: a {+ b} is set as a + b, not as a product."""
-        if piece[4] != "{" or not before or before[-1].text in FUNCTION_NAMES:
+        if piece["sign"] != "{" or not before or before[-1].text in FUNCTION_NAMES:
             return False
-        is_behind_operand = before[-1].kind in ("name", "number") or before[-1].text in (")", "]")
-        return is_behind_operand and self.text[piece.end() :].lstrip()[:1] in ("+", "-")
+        is_after_operand = before[-1].kind in ("name", "number") or before[-1].text in (")", "]")
+        return is_after_operand and self.text[piece.end() :].lstrip()[:1] in ("+", "-")
 
     def _over(self, tokens: list[Token]) -> list[Token]:
         r"""Read {a \over b} as \frac{a}{b}."""
@@ -131,15 +135,15 @@ class _LatexReader:
 
     def _item(self, piece: re.Match[str]) -> list[Token]:
         """Read one item with its subscript."""
-        at = piece.start(piece.lastindex or 0)
+        at = piece.start(piece.lastgroup or 0)
         self.at = piece.end()
-        if piece[1] is not None:
-            return self._command(piece[1], at - 1)
-        if piece[2] is not None:
-            return [Token("number", piece[2], at)]
-        if piece[3] is not None:
-            return self._letters(piece[3], at)
-        character = piece[4]
+        if piece["macro"] is not None:
+            return self._command(piece["macro"], at - 1)
+        if piece["number"] is not None:
+            return [Token("number", piece["number"], at)]
+        if piece["letters"] is not None:
+            return self._letters(piece["letters"], at)
+        character = piece["sign"]
         if character == "{":
             self.at = at
             return self._grouped(at)
@@ -168,19 +172,19 @@ class _LatexReader:
         piece = self._peek()
         if piece is None:
             fail(self.text, at, "ends where an argument was expected")
-        if piece[4] == "{":
+        if piece["sign"] == "{":
             self.at = piece.end()
             inner = self._until("}")
-        elif piece[2] is not None:
+        elif piece["number"] is not None:
             # \frac12 is 1/2: one digit each.
-            self.at = piece.start(2) + 1
-            inner = [Token("number", piece[2][0], piece.start(2))]
-        elif piece[3] is not None:
-            self.at = piece.start(3) + 1
-            inner = [Token("name", piece[3][0], piece.start(3))]
-        elif piece[1] is not None:
+            self.at = piece.start("number") + 1
+            inner = [Token("number", piece["number"][0], piece.start("number"))]
+        elif piece["letters"] is not None:
+            self.at = piece.start("letters") + 1
+            inner = [Token("name", piece["letters"][0], piece.start("letters"))]
+        elif piece["macro"] is not None:
             self.at = piece.end()
-            inner = self._command(piece[1], piece.start(1) - 1, bare=True)
+            inner = self._command(piece["macro"], piece.start("macro") - 1, takes_subscript=False)
         else:
             fail(self.text, piece.start(), "expected an argument")
         self.depth -= 1
@@ -191,8 +195,12 @@ class _LatexReader:
 
     # Names
 
-    def _name(self, name: str, at: int, bare: bool = False) -> list[Token]:
-        return [Token("name", name if bare else name + self._subscript(), at)]
+    def _name(self, name: str, at: int, takes_subscript: bool = True) -> list[Token]:
+        r"""Return a name, with the subscript after it unless that belongs to something that encloses the name.
+
+        In ``\dot\theta_1`` the subscript belongs to the dotted name: it is read after the dots.
+        """
+        return [Token("name", name + self._subscript() if takes_subscript else name, at)]
 
     def _letters(self, letters: str, at: int) -> list[Token]:
         """Read letters: a known name, a function's, or one name each, the last with its subscript."""
@@ -212,6 +220,11 @@ class _LatexReader:
         return [Token("name", name, at) for name in self._names(letters, below)]
 
     def _names(self, letters: str, below: str) -> list[str]:
+        """Split letters in a row into names; the subscript ``below`` belongs to the last one.
+
+        A known name at the end is preferred: ``mlc1`` with a known ``lc1`` is m times lc1. Otherwise every letter is a
+        name, as LaTeX sets it.
+        """
         if len(letters) == 1 or self.knows(letters + below) or (letters == "dt" and not below):
             return [letters + below]
         for k in range(1, len(letters)):
@@ -240,7 +253,7 @@ class _LatexReader:
 
     # Macros
 
-    def _command(self, name: str, at: int, bare: bool = False) -> list[Token]:
+    def _command(self, name: str, at: int, takes_subscript: bool = True) -> list[Token]:
         if name in _SPACES:
             return []
         if name in ("\\", "cr"):
@@ -262,15 +275,15 @@ class _LatexReader:
                 fail(self.text, at, "a root other than the square root")
             return [Token("name", "sqrt", at), *self._bracketed(at)]
         if name in DOT_MACROS:
-            return self._dotted(name, at, bare)
+            return self._dotted(name, at, takes_subscript)
         if name in STYLE_MACROS:
-            return self._upright(at, bare)
+            return self._upright(at, takes_subscript)
         if name in ("begin", "end"):
             return self._environment(name, at)
         if name in FUNCTION_NAMES or name == "top":
             return [Token("name", name, at)]
         if name in ("pi", "ell") or name in GREEK:
-            return self._name(SYMBOL_MACROS.get(name, name), at, bare)
+            return self._name(SYMBOL_MACROS.get(name, name), at, takes_subscript)
         if name in SYMBOL_MACROS:
             return [sign(SYMBOL_MACROS[name], at)]
         if name in "{}":
@@ -324,7 +337,7 @@ class _LatexReader:
 
     def _one_item(self) -> list[Token]:
         """Read one thing that is not a space; nothing at the end of a group."""
-        while (piece := self._peek()) is not None and piece[4] != "}":
+        while (piece := self._peek()) is not None and piece["sign"] != "}":
             if item := self._item(piece):
                 return item
         return []
@@ -334,16 +347,17 @@ class _LatexReader:
         tokens: list[Token] = []
         while item := self._one_item():
             tokens += item
+            # The bracket of an exponent, as in sin^(2)(x), does not enclose the argument.
             brackets = [
                 k
                 for k, token in enumerate(tokens)
                 if token.text == "(" and tokens[max(k - 1, 0)].text != "^"
             ]
-            if (
-                closing_bracket(tokens, brackets[0]) == len(tokens) - 1
-                if brackets
-                else tokens[-1].kind == "name"
-            ):
+            if brackets:
+                is_complete = closing_bracket(tokens, brackets[0]) == len(tokens) - 1
+            else:
+                is_complete = tokens[-1].kind == "name"
+            if is_complete:
                 break
         return tokens
 
@@ -352,21 +366,21 @@ class _LatexReader:
         if piece is None:
             fail(self.text, at, "ends where a bracket was expected")
         self.at = piece.end()
-        bracket = piece[1] or piece[4]
+        bracket = piece["macro"] or piece["sign"]
         if bracket == ".":
             return []
         if bracket in ("(", ")", "[", "]", "{", "}"):
             return [sign("(" if bracket in "([{" else ")", at)]
         return fail(self.text, at, "expected a bracket")
 
-    def _dotted(self, dots: str, at: int, bare: bool) -> list[Token]:
+    def _dotted(self, dots: str, at: int, takes_subscript: bool) -> list[Token]:
         r"""Read \dot\theta_1, \dot{\theta}_1 and \dot{\theta_1}."""
         inner = self._argument(at)
         if len(inner) != 1 or inner[0].kind != "name":
             fail(self.text, at, "dots on something that is not a name")
-        return self._name(rate_name(inner[0].text, dots), at, bare)
+        return self._name(rate_name(inner[0].text, dots), at, takes_subscript)
 
-    def _upright(self, at: int, bare: bool) -> list[Token]:
+    def _upright(self, at: int, takes_subscript: bool) -> list[Token]:
         inner = self._argument(at)
         if not all(token.kind in ("name", "number") for token in inner):
             if any(token.text in ("+", "-", "=", "<", ">", ",") for token in inner):
@@ -376,7 +390,7 @@ class _LatexReader:
         if not name:
             return []
         is_function = name in FUNCTION_NAMES and not self._next_is("_")
-        return self._name(name, at, bare or is_function)
+        return self._name(name, at, takes_subscript and not is_function)
 
     def _environment(self, name: str, at: int) -> list[Token]:
         match = re.compile(r"\s*\{(\w+)\*?\}(?:\{[clr|]*\})?", re.ASCII).match(self.text, self.at)

@@ -26,6 +26,9 @@ _VARIABLE = re.compile(r"(?:q|qd|qdd)\d+", re.ASCII)
 class Coordinates:
     """The student's joint variables y = S q, sums of the robot's joint variables q.
 
+    In what the student reads, y is printed under the names of q: q2 is the student's second variable, whatever it is
+    the sum of.
+
     With q = B y, the torques of y are B^T tau, so that power stays the same, and the mass matrix is B^T M B (Siciliano
     et al., Robotics, 2009, section 7.8, for any linear change of coordinates).
 
@@ -39,7 +42,7 @@ class Coordinates:
 
     @classmethod
     def relative(cls, n: int) -> Coordinates:
-        """Return the robot's own joint variables."""
+        """Return the robot's joint variables, y = q."""
         return cls(tuple((i,) for i in range(n)))
 
     @classmethod
@@ -53,7 +56,7 @@ class Coordinates:
 
     @property
     def is_relative(self) -> bool:
-        """Whether the variables are the robot's own."""
+        """Whether the student's variables are the robot's, y = q."""
         return all(len(joints) == 1 for joints in self.sums)
 
     @cached_property
@@ -86,20 +89,21 @@ class Coordinates:
         """Return the rates or accelerations of the variables from those of the joints, shape (n,)."""
         return rates if self.is_relative else self.S @ rates
 
-    def in_own_rates(self, element: Element) -> Element:
-        """Return an element with the joints' rates and accelerations replaced by the variables', for printing."""
+    def in_student_rates(self, element: Element) -> Element:
+        """Return an element written in the student's rates and accelerations, for printing: qd1 is then y1's rate."""
         if self.is_relative:
             return element
         ring = element.ring
         places: dict[int, Element] = {}
         for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
-            # qd = B yd, where yd is written with the names of qd.
-            own = self.B @ np.array([generator(i) for i in range(ring.n)], dtype=object)
-            places |= {ring.place(kind, i): x for i, x in enumerate(own)}
+            # qd = B yd; the names of qd now stand for yd.
+            student_rates = np.array([generator(i) for i in range(ring.n)], dtype=object)
+            robot_rates = self.B @ student_rates
+            places |= {ring.place(kind, i): x for i, x in enumerate(robot_rates)}
         return translated(element, ring, places)
 
-    def in_own_angles(self, text: str) -> str:
-        """Return a printed formula with c12 written as the cosine of a variable, or of the difference of two."""
+    def in_student_angles(self, text: str) -> str:
+        """Return a printed formula with c12 as the cosine of a student's variable, or of a difference of two."""
         if self.is_relative:
             return text
         angles = {angle_name(joints): f"q{j + 1}" for j, joints in enumerate(self.sums)}
@@ -117,17 +121,18 @@ class Coordinates:
 
         return ANGLE.sub(written, text)
 
-    def own_state(self, state: Mapping[str, float]) -> dict[str, float]:
+    def student_state(self, state: Mapping[str, float]) -> dict[str, float]:
         """Return a state, given by the robot's q1, qd1 ..., in the student's variables; missing values are zero."""
         if self.is_relative:
             return dict(state)
-        own: dict[str, float] = {}
+        student: dict[str, float] = {}
         for kind in ("q", "qd", "qdd"):
             names = [f"{kind}{i + 1}" for i in range(len(self.sums))]
             if any(name in state for name in names):
                 for name, joints in zip(names, self.sums, strict=True):
-                    own[name] = sum(state.get(names[i], 0.0) for i in joints)
-        return own | {name: value for name, value in state.items() if not _VARIABLE.fullmatch(name)}
+                    student[name] = sum(state.get(names[i], 0.0) for i in joints)
+        others = {name: value for name, value in state.items() if not _VARIABLE.fullmatch(name)}
+        return student | others
 
     def by_position(self, element: Element, i: int) -> Element:
         """Return the derivative by variable i."""

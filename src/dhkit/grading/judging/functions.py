@@ -135,7 +135,7 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
 
     # The student's joint variables are y = B^-1 q.
     B_inverse = np.linalg.inv(truth.coordinates.B.astype(float))
-    states = [_own_state(sample.names, B_inverse, n) for sample in listed]
+    states = [_student_state(sample.names, B_inverse, n) for sample in listed]
     values = answer.at(states, shape)
 
     generators = np.array([np.array(sample.generators, dtype=float) for sample in listed]).T
@@ -155,7 +155,7 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
     return _compared(name, sampled, right, truth)
 
 
-def _own_state(names: Mapping[str, Any], B_inverse: Array, n: int) -> dict[str, float]:
+def _student_state(names: Mapping[str, Any], B_inverse: Array, n: int) -> dict[str, float]:
     """Return a state with the student's joint variables y = B^-1 q instead of the robot's."""
     state = {name: float(value) for name, value in names.items()}
     for kind in _STATES:

@@ -43,34 +43,36 @@ def slip_of(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None
 
 def slip_between(truth: Truth, name: str, answer: Element, right: Element) -> Slip | None:
     """Return the slip that turns the truth into an answer, in the student's own rates and angles."""
-    own = truth.coordinates.in_own_rates
+    own = truth.coordinates.in_student_rates
     slip = slip_in(truth.arm(name), own(answer), own(right))
     if slip is None:
         return None
     return replace(
-        slip, detail=in_own_angles(truth, slip.detail), right=in_own_angles(truth, slip.right)
+        slip,
+        detail=in_student_angles(truth, slip.detail),
+        right=in_student_angles(truth, slip.right),
     )
 
 
-def in_own_angles(truth: Truth, text: str) -> str:
+def in_student_angles(truth: Truth, text: str) -> str:
     """Return a printed formula in the student's own angles."""
     if any(ANGLE.fullmatch(name) for name in truth.description.parameters):
         return text
-    return truth.coordinates.in_own_angles(text)
+    return truth.coordinates.in_student_angles(text)
 
 
-def shown_in_own_angles(truth: Truth, quantity: str, finding: Finding) -> Finding:
+def shown_in_student_angles(truth: Truth, quantity: str, finding: Finding) -> Finding:
     """Return a finding whose difference and state are written in the student's own angles and rates."""
     coordinates = truth.coordinates
     if coordinates.is_relative:
         return finding
     texts = finding.texts
     if finding.difference is not None:
-        own = readable(truth.arm(quantity), coordinates.in_own_rates(finding.difference))
-        texts = (in_own_angles(truth, plain_text(own)), "")
+        own = readable(truth.arm(quantity), coordinates.in_student_rates(finding.difference))
+        texts = (in_student_angles(truth, plain_text(own)), "")
     witness = finding.witness
     if witness is not None:
-        witness = replace(witness, state=coordinates.own_state(witness.state))
+        witness = replace(witness, state=coordinates.student_state(witness.state))
     return replace(finding, texts=texts, witness=witness)
 
 
@@ -159,11 +161,11 @@ def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis
     elif len(element) > BOUNDS.described_terms:
         text = f"{len(element)} terms, where {len(right)} are right"
     else:
-        own = truth.coordinates.in_own_rates
+        own = truth.coordinates.in_student_rates
         text, terms = compare_terms(truth.arm(quantity.name), own(element), own(right))
-    sentence = capitalize(f"{in_own_angles(truth, text)}.")
+    sentence = capitalize(f"{in_student_angles(truth, text)}.")
     return Diagnosis(
-        None, sentence, entry, (entry,), hint_of(None), second_hint=in_own_angles(truth, terms)
+        None, sentence, entry, (entry,), hint_of(None), second_hint=in_student_angles(truth, terms)
     )
 
 

@@ -354,8 +354,8 @@ def _part_entries(
         if slip is not None:
             diagnoses.append(diagnosis_of_slip(quantity, place, slip))
             continue
-        difference = truth.coordinates.in_own_rates(difference)
-        excess = entries.in_own_angles(
+        difference = truth.coordinates.in_student_rates(difference)
+        excess = entries.in_student_angles(
             truth, plain_text(readable(truth.arm(quantity.name), difference))
         )
         diagnoses.append(

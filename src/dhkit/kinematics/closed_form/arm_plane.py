@@ -95,7 +95,7 @@ class Shoulder:
     clamped: SX
     """Whether the point is too near to axis 1 by rounding only."""
 
-    def shortfall(self, offset: SX, x: SX, rise: SX) -> SX:
+    def distance_from_circle(self, offset: SX, x: SX, rise: SX) -> SX:
         """Return the least distance, m, of the point from the circle on which joint 1 moves a point (x, offset).
 
         The circle's radius is sqrt(x^2 + offset^2), its height differs by ``rise``, so that the distance is

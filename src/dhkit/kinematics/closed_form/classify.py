@@ -73,6 +73,24 @@ def classify(description: Description) -> Classification:
     """Read the axes of an arm and return its closed form, if it has one.
 
     Axes count as parallel or perpendicular to 1e-12 rad, as intersecting to 1e-12 of the reach.
+
+    Parameters
+    ----------
+    description
+        The arm.
+
+    Returns
+    -------
+    Classification
+        The family with its numbers, or in words what is missing for a closed form.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> classify(library_robot("puma560")).family.name
+    'elbow_wrist'
+    >>> print(classify(library_robot("jaco")).words)
+    6R: no closed form known
     """
     axes = Axes.of(description)
     kinds = f"{axes.n}R" if set(axes.kinds) == {"R"} else axes.kinds

@@ -56,9 +56,9 @@ class Fit:
     """Coordinates of a pose that the arm can reach: those of ``ALL_COORDINATES``, and yaw for its turn in the plane."""
     structure: str = ""
     """Variant of the formulas that their parameters do not tell, such as the order of the joints."""
-    free: int | None = None
+    free_joint: int | None = None
     """Index, from 0, of the joint that is free where two axes of the wrist coincide; None if there is none."""
-    ring: tuple[float, float] | None = None
+    wrist_distances: tuple[float, float] | None = None
     """Least and largest distance of a spherical wrist's centre from axis 2 in the arm's plane, m; None without one."""
 
     def vector(self) -> Array:

@@ -42,7 +42,7 @@ def nearest_wrist_distance(fit: Fit, T: Array) -> Array:
     T_tool_wrist = np.asarray(fit.parameters["T_tool_wrist"])
     a1 = float(np.asarray(fit.parameters["a1"]))
     offset = abs(float(np.asarray(fit.parameters["offset"])))
-    least, most = fit.ring or (0.0, np.inf)
+    least, most = fit.wrist_distances or (0.0, np.inf)
 
     wanted = T[:, :3, :3] @ T_tool_wrist[:, 3] + T[:, :3, 3]
     seen = wanted @ T_plane_world[:, :3].T + T_plane_world[:, 3]

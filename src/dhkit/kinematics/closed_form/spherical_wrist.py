@@ -55,20 +55,23 @@ from dhkit.kinematics.closed_form.wrist import (
 
 @dataclass(frozen=True)
 class _Region:
-    """One solution of the first three joints for the position of the wrist's centre."""
+    """One solution of the first three joints for the position of the wrist's centre.
+
+    Coordinates x, u lie in the arm's plane and v along its normal, see :class:`ArmPlane`.
+    """
 
     q: tuple[SX, SX, SX]
     rho: Pair
-    """Rotation of link 3 about v since zero joint positions, as a pair."""
+    """Rotation of link 3 about v, counted from all joints at zero, as a pair (cos, sin)."""
     shoulder: Shoulder
     miss: SX
-    """Distance of the wrist's centre from this solution's reach in the arm's plane, m."""
-    elbow: SX
-    """Whether the elbow is singular: the arm is stretched, folded or drawn in."""
+    """How far the wrist's centre is from what links 2 and 3 reach with joint 1 at this solution's angle, m."""
+    elbow_is_singular: SX
+    """Whether the arm is stretched, folded or drawn in."""
     clamped: SX
     """Whether the centre lies beyond the boundary by rounding only."""
     distance: SX | None = None
-    """Distance of the centre from the nearest point that is reached, m; equals ``miss`` if not given."""
+    """Distance of the centre from the nearest point reached with any angle of joint 1, m; ``miss`` if not given."""
 
 
 def elbow_fit(axes: Axes) -> Fit | None:
@@ -86,8 +89,8 @@ def elbow_fit(axes: Axes) -> Fit | None:
         geometry="spherical wrist, axes 2 and 3 parallel",
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | links,
         branches=branch_names(links["offset"], ELBOWS, FLIPS),
-        free=3,
-        ring=link_range(links),
+        free_joint=3,
+        wrist_distances=link_range(links),
     )
 
 
@@ -104,9 +107,9 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 rho=elbow.rotation,
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, elbow.miss),
-                elbow=elbow.singular,
+                elbow_is_singular=elbow.singular,
                 clamped=logic_or(shoulder.clamped, elbow.clamped),
-                distance=shoulder.shortfall(
+                distance=shoulder.distance_from_circle(
                     p["offset"], p["a1"] + elbow.nearest[0], T.position[1] - elbow.nearest[1]
                 ),
             )
@@ -139,8 +142,8 @@ def slide_fit(axes: Axes) -> Fit | None:
         geometry="spherical wrist, joint 3 slides at right angles to axis 2",
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | geometry,
         branches=branch_names(geometry["offset"], ("out", "in"), FLIPS),
-        free=3,
-        ring=(abs(float(geometry["lift"])), np.inf),
+        free_joint=3,
+        wrist_distances=(abs(float(geometry["lift"])), np.inf),
     )
 
 
@@ -174,7 +177,7 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                 rho=q2,
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, if_else(beyond, short, 0.0)),
-                elbow=length < SINGULAR * p["reach"],
+                elbow_is_singular=length < SINGULAR * p["reach"],
                 clamped=logic_or(shoulder.clamped, logic_and(square < 0, logic_not(beyond))),
             )
             branches += _with_wrist(p, T.rotation, region, pose)
@@ -206,7 +209,7 @@ def _with_wrist(
     flags = {
         "miss": region.miss,
         "shoulder": region.shoulder.singular,
-        "elbow": region.elbow,
+        "elbow": region.elbow_is_singular,
         "wrist": hypot(wrist.a[0], wrist.a[1]) < SINGULAR,
         "clamped": region.clamped,
         "distance": region.distance,

@@ -81,7 +81,7 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
         # ``offset`` of ``own``, that of the meeting point, replaces the one of ``links``, of a point of axis 4.
         parameters=wrist_parameters(axes, plane, axes.direction(2), meeting) | links | own,
         branches=branch_names(own["offset"], ELBOWS, FLIPS),
-        free=5,  # q6
+        free_joint=5,  # q6
     )
 
 

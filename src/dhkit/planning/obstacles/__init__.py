@@ -14,7 +14,7 @@ from dhkit.planning.obstacles.clearance import (
     pair_distances,
     smallest_distances,
 )
-from dhkit.planning.obstacles.contact import (
+from dhkit.planning.obstacles.nearest import (
     NearestLinks,
     NearestObstacle,
     may_touch,

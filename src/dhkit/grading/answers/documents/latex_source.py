@@ -140,36 +140,52 @@ def _statements(text: str) -> Iterator[Statement]:
     if begins:
         text = re.sub(r"[^\n]", "", preamble) + body.partition("\\end{document}")[0]
     text = _blank(text, _MACRO, _end_of_definition)
-    last: Statement | None = None
+    # A display is held back until the next one is seen: it may continue an equation that this one began.
+    held: Statement | None = None
     for display in _displays(text):
-        inside, problems = _expand(display.inside, macros)
-        statements = list(latex_statements(inside, display.line))
-        whole_text = "\n".join(statement.text for statement in statements)
-        lost = [why for name, why in problems.items() if f"\\{name}" not in whole_text]
-        for k, statement in enumerate(statements):
-            used = [why for name, why in problems.items() if _uses(statement.text, name)]
-            if used or lost:
-                statement = replace(
-                    statement, problem=used[0] if used else statement.problem or lost[0]
-                )
-            is_rest = STARTS_WITH_RELATION.match(statement.text) or not has_relation(statement.text)
-            goes_on = (
-                k == 0
-                and not display.is_inline
-                and STARTS.match(statement.text) is not None
-                and is_rest
-            )
-            if goes_on and last is not None and not statement.targets:
-                yield replace(
-                    last, problem=f"it goes on in another display, in line {display.line}"
-                )
-                last = None
+        for k, statement in enumerate(_display_statements(display, macros)):
+            if held is not None and k == 0 and _continues(statement, display):
+                problem = f"it goes on in another display, in line {display.line}"
+                yield replace(held, problem=problem)
+                held = None
                 continue
-            if last is not None:
-                yield last
-            last = statement
-    if last is not None:
-        yield last
+            if held is not None:
+                yield held
+            held = statement
+    if held is not None:
+        yield held
+
+
+def _display_statements(display: _Display, macros: Mapping[str, _Macro]) -> list[Statement]:
+    """Return a display's statements, with the document's macros put in.
+
+    Statements that use a macro that is not read get that as their problem. A macro that no statement's text shows was
+    used between the statements (it may have dropped a row, or a sign between two): then it is the problem of all.
+    """
+    inside, problems = _expand(display.inside, macros)
+    statements = list(latex_statements(inside, display.line))
+    whole_text = "\n".join(statement.text for statement in statements)
+    between = [why for name, why in problems.items() if f"\\{name}" not in whole_text]
+    marked = []
+    for statement in statements:
+        used = [why for name, why in problems.items() if _uses(statement.text, name)]
+        if used:
+            marked.append(replace(statement, problem=used[0]))
+        elif between:
+            marked.append(replace(statement, problem=statement.problem or between[0]))
+        else:
+            marked.append(statement)
+    return marked
+
+
+def _continues(statement: Statement, display: _Display) -> bool:
+    """Whether the first statement of a display continues the equation of the display before: it starts with a sign."""
+    if display.is_inline or statement.targets:
+        return False
+    if STARTS.match(statement.text) is None:
+        return False
+    is_relation = STARTS_WITH_RELATION.match(statement.text) is not None
+    return is_relation or not has_relation(statement.text)
 
 
 def _blank(text: str, pattern: re.Pattern[str], end_of: Callable[[re.Match[str]], int]) -> str:
@@ -281,9 +297,11 @@ def _macros(text: str) -> dict[str, _Macro]:
             ("\\newcommand", "\\renewcommand", "\\providecommand", "\\def"), match.start()
         )
         is_symbol = _SYMBOL.fullmatch(symbol) is not None and is_command
-        if name in _READ_MACROS and symbol not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
+        # A macro with a meaning may not get another one, but \theta and \vartheta are read as the same letter.
+        same_letter = (f"\\var{name}", f"\\{name.removeprefix('var')}")
+        if name in _READ_MACROS and symbol not in same_letter:
             is_symbol = False
-        if len(macros) > BOUNDS.macros:
+        if name not in macros and len(macros) == BOUNDS.macros:
             raise AnswerError(f"more than {BOUNDS.macros} macros")
         macros[name] = _Macro(line, symbol if is_symbol and name not in macros else None)
     return macros

@@ -472,7 +472,25 @@ def _dot(row: Sequence[Scalar], column: Sequence[Scalar], power: str) -> Scalar:
 
 
 def calculated(left: Value, sign: str, right: Value, power: str = "^") -> Value:
-    """Return the result of an operation: + - * / ^, @ for the product of matrices, .* ./ .^ for entry by entry."""
+    """Return the result of an operation.
+
+    The sign says what is meant only together with the language, which a matrix carries as ``multiplies_entries``:
+
+    ======================  =======================  =======================
+    operation               NumPy arrays (True)      MATLAB, SymPy (False)
+    ======================  =======================  =======================
+    product of matrices     ``A @ B``                ``A * B``
+    entry by entry          ``A * B``, ``A / B``     ``A .* B``, ``A ./ B``
+    with a number           ``A * s``, ``A + s``     ``A * s``; ``A + s`` is refused
+    power of a matrix       refused                  ``A ^ k``
+    power entry by entry    refused                  ``A .^ k``
+    ======================  =======================  =======================
+
+    Raises
+    ------
+    UnreadError
+        A list, text or function, or an operation that the table does not have.
+    """
     for side in (left, right):
         if not isinstance(side, Scalar | Matrix):
             raise UnreadError("a calculation with what is not a number or a matrix is not read")

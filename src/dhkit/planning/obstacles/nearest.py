@@ -1,4 +1,4 @@
-"""The nearest two links of an arm, and the nearest link and obstacle, by their shapes, with their nearest points."""
+"""The two nearest links of an arm, and the nearest link and obstacle, measured between their shapes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
+from operator import itemgetter
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,8 +23,8 @@ from dhkit.planning.obstacles.solids import (
     segment_distances,
 )
 
-Measured = TypeVar("Measured")
-"""Two bodies of links, or one and an obstacle."""
+Pair = TypeVar("Pair")
+"""Two bodies of links, or a body and an obstacle."""
 
 
 class NearestLinks(NamedTuple):
@@ -65,8 +66,7 @@ def nearest_links(description: Description, q: ArrayLike) -> NearestLinks | None
     q = joint_vector(description, q)
     bounds = _lower_bounds(description, q)
     frames = world_to_frames(description, q)
-    in_order = sorted((bound, bodies) for bodies, bound in bounds.items())
-    found = _nearest_in_order(in_order, partial(nearest_of_bodies, description, frames))
+    found = _nearest_in_order(bounds, partial(nearest_of_bodies, description, frames))
     return None if found is None else NearestLinks(*found.pair, found.distance, found.points)
 
 
@@ -115,21 +115,21 @@ def nearest_obstacle(
     axes = world_axes(description, q[None])[0]
     bounds: list[tuple[float, tuple[LinkBody, Obstacle | Floor]]] = []
     for obstacle in check_obstacles(obstacles):
-        of_bodies = _bounds_beside(description, axes, obstacle)
-        bounds += [(bound, (body, obstacle)) for body, bound in of_bodies.items()]
+        for body, bound in _bounds_beside(description, axes, obstacle).items():
+            bounds.append((bound, (body, obstacle)))
 
     def measure(
         pair: tuple[LinkBody, Obstacle | Floor], enough: float
     ) -> tuple[float, Array] | None:
         return nearest_to_obstacle(description, frames, *pair, enough)
 
-    found = _nearest_in_order(sorted(bounds, key=lambda entry: entry[0]), measure)
+    found = _nearest_in_order(bounds, measure)
     return None if found is None else NearestObstacle(*found.pair, found.distance, found.points)
 
 
 @dataclass(frozen=True)
-class _Nearest(Generic[Measured]):
-    pair: Measured
+class _Nearest(Generic[Pair]):
+    pair: Pair
     distance: float
     """m"""
     points: Array
@@ -137,17 +137,17 @@ class _Nearest(Generic[Measured]):
 
 
 def _nearest_in_order(
-    bounds: Sequence[tuple[float, Measured]],
-    measure: Callable[[Measured, float], tuple[float, Array] | None],
-) -> _Nearest[Measured] | None:
-    """Return the nearest of pairs, measured in the order of the lower bounds of their distances, m.
+    bounds: Sequence[tuple[float, Pair]],
+    measure: Callable[[Pair, float], tuple[float, Array] | None],
+) -> _Nearest[Pair] | None:
+    """Return the nearest of pairs, each given with a lower bound of its distance, m.
 
-    The search ends where the next bound is not below the smallest distance found, which is what ``measure`` gets
-    beside a pair: it returns None for a distance that is not below it.
+    Pairs are measured in the order of their bounds. The search ends where the next bound is not below the smallest
+    distance found. ``measure`` gets a pair and that smallest distance; it returns None for a pair that is not nearer.
     """
-    nearest: _Nearest[Measured] | None = None
+    nearest: _Nearest[Pair] | None = None
     enough = np.inf
-    for bound, pair in bounds:
+    for bound, pair in sorted(bounds, key=itemgetter(0)):
         if nearest is not None and bound >= enough:
             break
         found = measure(pair, enough)
@@ -177,9 +177,10 @@ def _bounds_beside(
 
 
 def may_touch(description: Description, q: ArrayLike) -> tuple[LinkBody, LinkBody] | None:
-    """Return the two links whose capsules penetrate each other deepest, if any do: the links themselves may touch.
+    """Return the two links whose capsules penetrate each other deepest; None if no capsules penetrate each other.
 
-    It needs neither coal nor the shapes; links with one joint between them are left out.
+    Capsules contain the links' shapes: the links returned may touch, and if it returns None, no links do. Links with
+    one joint between them are left out. Neither coal nor the shapes are needed.
 
     Parameters
     ----------
@@ -187,7 +188,6 @@ def may_touch(description: Description, q: ArrayLike) -> tuple[LinkBody, LinkBod
         Joint values, shape (n,), rad and m.
     """
     capsules = link_capsules(description)
-    axes = world_axes(description, joint_vector(description, q)[None])[0]
     pairs = [
         (i, j)
         for (i, first), (j, second) in combinations(enumerate(capsules), 2)
@@ -195,34 +195,44 @@ def may_touch(description: Description, q: ArrayLike) -> tuple[LinkBody, LinkBod
     ]
     if not pairs:
         return None
-    i, j = np.array(pairs).T
-    radii = np.array([capsule.radius for capsule in capsules])
+    gaps = _gaps(description, joint_vector(description, q), pairs)
+    deepest = int(np.argmin(gaps))
+    if gaps[deepest] >= 0:
+        return None
+    i, j = pairs[deepest]
+    return capsules[i].body, capsules[j].body
 
-    # Capsules are as far apart as their axes less both radii.
-    gaps = segment_distances(axes[i], axes[j]) - radii[i] - radii[j]
-    worst = int(np.argmin(gaps))
-    return (capsules[i[worst]].body, capsules[j[worst]].body) if gaps[worst] < 0 else None
 
-
-def _lower_bounds(description: Description, q: Array) -> dict[tuple[LinkBody, LinkBody], float]:
-    """Return lower bounds of the distances between the bodies of links that are checked, m: those of their capsules."""
+def _lower_bounds(
+    description: Description, q: Array
+) -> list[tuple[float, tuple[LinkBody, LinkBody]]]:
+    """Return the pairs of bodies that are checked, each after the distance of their capsules, m: a lower bound."""
     capsules = link_capsules(description)
-    pairs = link_pairs(description)
-    checked = {(capsules[i].body, capsules[j].body) for i, j in pairs.capsules} | set(pairs.shapes)
-    checked -= set(pairs.unchecked)
-    of_bodies = [
+    checks = link_pairs(description)
+    checked = {(capsules[i].body, capsules[j].body) for i, j in checks.capsules}
+    checked |= set(checks.shapes)
+    checked -= set(checks.unchecked)
+    pairs = [
         (i, j)
         for (i, first), (j, second) in combinations(enumerate(capsules), 2)
         if (first.body, second.body) in checked
     ]
-    if not of_bodies:
-        return {}
-    i, j = np.array(of_bodies).T
+    if not pairs:
+        return []
+    least: dict[tuple[LinkBody, LinkBody], float] = {}
+    for (i, j), gap in zip(pairs, _gaps(description, q, pairs).tolist(), strict=True):
+        bodies = capsules[i].body, capsules[j].body
+        least[bodies] = min(least.get(bodies, np.inf), gap)
+    return [(bound, bodies) for bodies, bound in least.items()]
+
+
+def _gaps(description: Description, q: Array, pairs: Sequence[tuple[int, int]]) -> Array:
+    """Return the signed distances between capsules, given by their indices, shape (pairs,), m.
+
+    Capsules are as far apart as their axes less both radii.
+    """
+    i, j = np.array(pairs).T
     axes = world_axes(description, q[None])[0]
-    radii = np.array([capsule.radius for capsule in capsules])
-    gaps = segment_distances(axes[i], axes[j]) - radii[i] - radii[j]
-    bounds: dict[tuple[LinkBody, LinkBody], float] = {}
-    for (first, second), gap in zip(of_bodies, gaps.tolist(), strict=True):
-        bodies = capsules[first].body, capsules[second].body
-        bounds[bodies] = min(bounds.get(bodies, np.inf), gap)
-    return bounds
+    radii = np.array([capsule.radius for capsule in link_capsules(description)])
+    gaps: Array = segment_distances(axes[i], axes[j]) - radii[i] - radii[j]
+    return gaps
