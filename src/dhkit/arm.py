@@ -16,6 +16,7 @@ from dhkit.display import repr_line
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
+    from dhkit.arm_calls import ArmCalls
     from dhkit.control import (
         BatchOptions,
         BatchResult,
@@ -558,10 +559,14 @@ class Arm:
         from dhkit.kinematics import kinematic_kernels
 
         kernels = kinematic_kernels(self._description) + dynamic_kernels(self._description)
+        count = len(kernels) + self._calls.count()
         for k, kernel in enumerate(kernels):
             kernel.compile()
             if progress is not None:
-                progress(k + 1, len(kernels))
+                progress(k + 1, count)
+        for k, _ in enumerate(self._calls.compile(), start=len(kernels)):
+            if progress is not None:
+                progress(k + 1, count)
 
     # Kinematics
 
@@ -596,6 +601,8 @@ class Arm:
         >>> arm.fk(np.zeros((1000, 2))).shape
         (1000, 4, 4)
         """
+        if threads == 1 and (T := self._calls.fk(q, out)) is not None:
+            return T
         from dhkit.kinematics import forward_kinematics
 
         return forward_kinematics(self._description, q, out, threads)
@@ -627,6 +634,8 @@ class Arm:
         >>> Arm.load("planar2r").frames([0, 0])[:, 0, 3]      # x of the origins
         array([0. , 0.5, 0.9])
         """
+        if threads == 1 and (T := self._calls.frames(q, out)) is not None:
+            return T
         from dhkit.kinematics import frames
 
         return frames(self._description, q, out, threads)
@@ -670,6 +679,8 @@ class Arm:
                [0.9, 0.4],
                [1. , 1. ]])
         """
+        if threads == 1 and frame == "world" and (J := self._calls.jacobian(q, out)) is not None:
+            return J
         from dhkit.kinematics import jacobian
 
         return jacobian(self._description, q, frame, out, threads)
@@ -713,6 +724,9 @@ class Arm:
         >>> acceleration.shape
         (6,)
         """
+        is_world = frame == "world"
+        if threads == 1 and is_world and (Jd := self._calls.jacobian_dot(q, qd, out)) is not None:
+            return Jd
         from dhkit.kinematics import jacobian_dot
 
         return jacobian_dot(self._description, q, qd, frame, out, threads)
@@ -1119,6 +1133,8 @@ class Arm:
         array([[0.9217, 0.23  ],
                [0.23  , 0.08  ]])
         """
+        if threads == 1 and (M := self._calls.mass_matrix(q, out)) is not None:
+            return M
         from dhkit.dynamics import mass_matrix
 
         return mass_matrix(self._description, q, out, threads)
@@ -1155,6 +1171,8 @@ class Arm:
         array([[-0.0631, -0.1893],
                [ 0.1262,  0.    ]])
         """
+        if threads == 1 and (C := self._calls.coriolis_matrix(q, qd, out)) is not None:
+            return C
         from dhkit.dynamics import coriolis_matrix
 
         return coriolis_matrix(self._description, q, qd, out, threads)
@@ -1188,6 +1206,8 @@ class Arm:
         >>> Arm.load("planar2r").gravity_torque([0, 0]).round(3)
         array([15.206,  2.943])
         """
+        if threads == 1 and (g := self._calls.gravity_torque(q, out)) is not None:
+            return g
         from dhkit.dynamics import gravity_torque
 
         return gravity_torque(self._description, q, out, threads)
@@ -1227,6 +1247,8 @@ class Arm:
         >>> bool(np.allclose(arm.bias(q, qd), h + arm.gravity_torque(q)))
         True
         """
+        if threads == 1 and (h := self._calls.bias(q, qd, out)) is not None:
+            return h
         from dhkit.dynamics import bias
 
         return bias(self._description, q, qd, out, threads)
@@ -1278,6 +1300,13 @@ class Arm:
         >>> bool(np.allclose(tau, arm.mass_matrix(q) @ qdd + arm.bias(q, qd)))
         True
         """
+        is_free = wrench is None and friction is False
+        if (
+            threads == 1
+            and is_free
+            and (torque := self._calls.inverse_dynamics(q, qd, qdd, out)) is not None
+        ):
+            return torque
         from dhkit.dynamics import inverse_dynamics
 
         return inverse_dynamics(self._description, q, qd, qdd, wrench, friction, out, threads)
@@ -1328,6 +1357,13 @@ class Arm:
         >>> bool(np.allclose(arm.forward_dynamics([0.3, -0.5], [1.0, 0.2], tau), [0.5, -1.0]))
         True
         """
+        is_free = wrench is None and friction is False
+        if (
+            threads == 1
+            and is_free
+            and (qdd := self._calls.forward_dynamics(q, qd, tau, out)) is not None
+        ):
+            return qdd
         from dhkit.dynamics import forward_dynamics
 
         return forward_dynamics(self._description, q, qd, tau, wrench, friction, out, threads)
@@ -1469,6 +1505,56 @@ class Arm:
         from dhkit.dynamics import friction_torque
 
         return friction_torque(self._description, qd, friction, out, threads)
+
+    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, base: bool = False) -> Array:
+        """Return the matrix Y(q, qd, qdd) of inverse dynamics, which is linear in the inertial parameters.
+
+        tau = Y theta + B qdd, where theta is :func:`dhkit.dynamics.inertial_parameters` and B is
+        ``description.numbers.drive_inertia``; B is 0 for an arm without drives. Base parameters contain the drives'
+        inertia: with ``base=True``, tau = Y beta with beta = ``base_parameters().values()``.
+
+        Parameters
+        ----------
+        q, qd, qdd
+            Joint values, rates and accelerations, shape (..., n), rad, m and seconds; batch axes broadcast.
+        base
+            Whether the columns are those of the base parameters, in the order of ``base_parameters().names``.
+
+        Returns
+        -------
+        Array
+            Shape (..., n, 10 n), columns link by link: mass, first moments x, y, z and second moments xx, yy, zz, xy,
+            yz, xz of the link about the origin of its DH frame. With ``base=True`` shape (..., n, parameters). NaN
+            where a state is not finite.
+
+        Raises
+        ------
+        DescriptionError
+            ``base=True`` and a link without a body.
+        RingError
+            ``base=True`` and the symbolic equations of motion are too long.
+        ValueError, TypeError
+            An argument of another shape, or not numeric.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from dhkit.dynamics import inertial_parameters
+        >>> arm = Arm.load("planar2r")
+        >>> motion = [0.3, -0.5], [1.0, 0.2], [0.5, -1.0]
+        >>> Y = arm.regressor(*motion)
+        >>> Y.shape
+        (2, 20)
+        >>> bool(np.allclose(Y @ inertial_parameters(arm), arm.inverse_dynamics(*motion)))
+        True
+        >>> arm.regressor(*motion, base=True).shape
+        (2, 6)
+        """
+        from dhkit.dynamics import regressor
+
+        if base:
+            return self.base_parameters().regressor(q, qd, qdd)
+        return regressor(self._description, q, qd, qdd)
 
     @cached_property
     def casadi(self) -> CasadiFunctions:
@@ -2616,6 +2702,13 @@ class Arm:
         from dhkit.viewer import View
 
         return View(self._description, frames=frames, port=port, token=token)
+
+    @cached_property
+    def _calls(self) -> ArmCalls:
+        """Compiled functions for single states."""
+        from dhkit.arm_calls import ArmCalls
+
+        return ArmCalls(self._description)
 
     # Value semantics
 

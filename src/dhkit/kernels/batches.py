@@ -35,6 +35,11 @@ def fill(
     threads
         Number of threads for a large batch.
 
+    Returns
+    -------
+    Array
+        Shape ``(..., *tail)``.
+
     Raises
     ------
     ValueError
@@ -78,10 +83,27 @@ def _batch(states: Sequence[Array]) -> tuple[int, ...]:
 def check_whole(name: str, value: object, least: int) -> None:
     """Check that a value is a whole number of at least ``least``.
 
+    Parameters
+    ----------
+    name
+        Name of the argument in messages.
+    value
+        Value to check.
+    least
+        Smallest value accepted.
+
     Raises
     ------
     ValueError
         It is not; gives the name, the value found and the value expected.
+
+    Examples
+    --------
+    >>> check_whole("samples", 10, 1)
+    >>> check_whole("samples", 0, 1)
+    Traceback (most recent call last):
+        ...
+    ValueError: samples is 0; expected a whole number, 1 or more
     """
     if not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} is {value!r}; expected a whole number, {least} or more")
@@ -90,12 +112,28 @@ def check_whole(name: str, value: object, least: int) -> None:
 def pose_rows(T: ArrayLike) -> Array:
     """Return poses T as a C-contiguous float64 array (..., 4, 4), m.
 
+    Parameters
+    ----------
+    T
+        Poses, shape (..., 4, 4), m.
+
+    Returns
+    -------
+    Array
+        T itself where it is such an array already.
+
     Raises
     ------
     ValueError
         Another shape.
     TypeError
         Not numbers.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> pose_rows(np.eye(4)).flags.c_contiguous
+    True
     """
     poses = np.ascontiguousarray(number_array(T, "T", "(..., 4, 4)"))
     if poses.shape[-2:] != (4, 4):
@@ -106,10 +144,27 @@ def pose_rows(T: ArrayLike) -> Array:
 def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
     """Return ``out`` of this shape, or a new array if it is None; in any unit.
 
+    Parameters
+    ----------
+    shape
+        Shape of the result.
+    out
+        Array to write into, or None.
+
+    Returns
+    -------
+    Array
+        ``out``, or a new array whose values are not set.
+
     Raises
     ------
     ValueError
         ``out`` is not a writeable, contiguous float64 array of the shape.
+
+    Examples
+    --------
+    >>> result_array((2, 3), None).shape
+    (2, 3)
     """
     if out is None:
         return np.empty(shape)

@@ -21,7 +21,7 @@ from dhkit.symbolic import Graph
 
 if TYPE_CHECKING:
     from dhkit.kernels.interpreter import Interpreter
-    from dhkit.kernels.machine_code import CompiledFunction
+    from dhkit.kernels.machine_code import CompiledCall, CompiledFunction
 
 log = logging.getLogger(__name__)
 
@@ -42,10 +42,20 @@ _MAX_KERNELS = 2_048
 def kernel_mode() -> str:
     """Return the value of ``DHKIT_KERNELS`` at the first call: ``auto``, ``on`` (always compile) or ``off`` (never).
 
+    Returns
+    -------
+    str
+        ``auto`` unless the variable is set.
+
     Raises
     ------
     DhkitError
         The variable has another value.
+
+    Examples
+    --------
+    >>> kernel_mode() in ("auto", "on", "off")
+    True
     """
     mode = os.environ.get("DHKIT_KERNELS") or "auto"
     if mode not in _MODES:
@@ -70,6 +80,7 @@ class Kernel:
         self._graph: Graph | None = None
         self._interpreter: Interpreter | None = None
         self._function: CompiledFunction | None = None
+        self._call: CompiledCall | None = None
         self._looked_up = False
         """Whether the cache was searched for machine code."""
         self._failed = False
@@ -112,6 +123,42 @@ class Kernel:
                 self._look_up()
             if self._function is None and not self._failed:
                 self._compile()
+
+    def compiled_call(self, tail: tuple[int, ...], refuses_nan: bool) -> CompiledCall | None:
+        """Return the program as a function for single calls, from the cache or compiled now; None if both fail.
+
+        Parameters
+        ----------
+        tail
+            Axes of the result after those of the batch; the same at each call.
+        refuses_nan
+            Whether it refuses arguments whose result is not finite; the same at each call.
+        """
+        with _compiling:
+            if self._call is None and not self._failed:
+                try:
+                    self._call = self._compiled_call(tail, refuses_nan)
+                except _MACHINE_CODE_ERRORS as error:
+                    self._give_up(error)
+            return self._call
+
+    def _compiled_call(self, tail: tuple[int, ...], refuses_nan: bool) -> CompiledCall:
+        from dhkit.kernels import machine_code, store
+        from dhkit.kernels.call_source import call_source
+
+        name = f"{self.name}_call"
+        key = store.digest(name, self._pattern)
+        code = store.read(name, key)
+        if code is None:
+            log.info("compiling %s", name)
+            source = call_source(self._program(), tail, refuses_nan=refuses_nan)
+            code = machine_code.compile_module(source)
+            store.write(name, key, code)
+        return machine_code.CompiledCall(code)
+
+    def state_sizes(self) -> list[int]:
+        """Return the number of entries of each input after the parameters."""
+        return [variable.size for variable in self._program().inputs[1:]]
 
     def __repr__(self) -> str:
         return repr_line(
@@ -206,7 +253,20 @@ _uncounted = _Uncounted()
 
 @contextmanager
 def uncounted() -> Iterator[None]:
-    """Exclude this thread's batches from counting towards compiling, for calls that control loops may make."""
+    """Exclude this thread's batches from counting towards compiling, for calls that control loops may make.
+
+    Yields
+    ------
+    None
+        Nothing; the exclusion lasts until the block ends.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> arm = Arm.load("planar2r")
+    >>> with uncounted():
+    ...     T = arm.fk([0.0, 0.0])
+    """
     _uncounted.depth += 1
     try:
         yield
@@ -227,6 +287,11 @@ def kernel(
         Returns the program; its first input holds the parameters, which all items share.
     types
         Type of each output: float64, or uint8 for whole numbers from 0 to 255.
+
+    Returns
+    -------
+    Kernel
+        The kernel, interpreted until compiling pays.
     """
     found = _kernels.get((name, pattern))
     if found is None:

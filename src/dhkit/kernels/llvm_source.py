@@ -12,13 +12,11 @@ from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
 from dhkit.kernels.vectors import (
     EXACT,
     FUSING,
-    VECTOR,
     WIDTH,
     Body,
     Mask,
     Vector,
     absolute,
-    constant,
     floor,
     select,
     sqrt,
@@ -102,10 +100,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
     outputs = [f"%y{k}" for k in range(len(graph.outputs))]
     lines = [
-        *(
-            f"declare {VECTOR} @llvm.{name}.v{WIDTH}f64({VECTOR})"
-            for name in ("fabs", "sqrt", "floor")
-        ),
+        *body.declarations(),
         "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
         "entry:",
         *chain.from_iterable(_array(k, name) for k, name in enumerate((*inputs, *outputs))),
@@ -164,38 +159,112 @@ def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) ->
     rows = []
     for start, variable in zip(layout.inputs, graph.inputs[1:], strict=False):
         rows.append([_loaded(body, start + entry) for entry in range(variable.size)])
-    values = _node_values(graph, body, rows)
-    missing: Vector | None = None  # 0, or NaN where an input is not finite
-    for x in chain.from_iterable(rows):
-        missing = x - x if missing is None else missing + (x - x)
+    parameters = [Vector(body, f"%p{k}") for k in range(graph.inputs[0].size)]
     lines = []
-    for k, entries in enumerate(graph.results):
-        for entry, place in enumerate(entries):
-            result = _number(values[place])
-            if types[k] == FLOAT and missing is not None:
-                result = result + missing
+    for k, results in enumerate(result_values(graph, body, [parameters, *rows], types)):
+        for entry, result in enumerate(results):
             address = _address(body, layout.outputs[k] + entry)
-            lines.append(f"  store {VECTOR} {result.name}, ptr {address}, align 64")
+            lines.append(f"  store {body.number_type} {result.name}, ptr {address}, align 64")
     return lines
 
 
-def _node_values(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> list[_Value]:
+def result_values(
+    graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]], types: Sequence[str]
+) -> list[list[Vector]]:
+    """Write a program's operations into ``body`` and return the entries of its outputs.
+
+    Parameters
+    ----------
+    graph, types
+        The program, and the type of each output; see :func:`llvm_source`.
+    body
+        Where the operations are written, and how many items they work on.
+    inputs
+        The entries of each input, the parameters first.
+
+    Returns
+    -------
+    list
+        The entries of each output; of float outputs they are NaN where an entry of an input after the parameters is
+        not finite.
+    """
+    values = _node_values(graph, body, inputs)
+    missing: Vector | None = None  # 0, or NaN where an input is not finite
+    for x in chain.from_iterable(inputs[1:]):
+        missing = x - x if missing is None else missing + (x - x)
+    outputs = []
+    for kind, places in zip(types, graph.results, strict=True):
+        entries = [_number(values[place]) for place in places]
+        if kind == FLOAT and missing is not None:
+            entries = [entry + missing for entry in entries]
+        outputs.append(entries)
+    return outputs
+
+
+def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[_Value]:
     """Return the value of every node."""
     values: dict[int, _Value] = {}
     pairs = graph.angle_pairs
-    for k, node in enumerate(graph.nodes):
+
+    def evaluate(k: int) -> None:
+        node = graph.nodes[k]
         if node.operation == "constant":
-            values[k] = Vector(body, constant(node.value))
+            values[k] = Vector(body, body.constant(node.value))
         elif node.operation == "input":
             variable, entry = node.arguments
-            values[k] = Vector(body, f"%p{entry}") if variable == 0 else rows[variable - 1][entry]
+            values[k] = inputs[variable][entry]
         elif node.operation in ("sin", "cos"):
-            if k not in values:
-                angle = node.arguments[0]
-                values |= dict(zip(pairs[angle], sincos(_number(values[angle])), strict=True))
+            angle = node.arguments[0]
+            values.update(zip(pairs[angle], sincos(_number(values[angle])), strict=True))
         else:
             values[k] = _apply(node.operation, [values[j] for j in node.arguments])
+
+    if body.width == 1:
+        # The sines of one item's angles are computed together, an angle in each lane of a vector.
+        first = _before_sines(graph)
+        for k in first:
+            evaluate(k)
+        angles = [angle for angle in pairs if angle in first]
+        results = _sincos_in_lanes(body, [_number(values[angle]) for angle in angles])
+        for angle, both in zip(angles, results, strict=True):
+            values.update(zip(pairs[angle], both, strict=True))
+    for k in range(len(graph.nodes)):
+        if k not in values:
+            evaluate(k)
     return [values[k] for k in range(len(graph.nodes))]
+
+
+def _before_sines(graph: Graph) -> list[int]:
+    """Return the nodes that no sine or cosine goes into, in order."""
+    found: set[int] = set()
+    for k, node in enumerate(graph.nodes):
+        is_source = node.operation in ("constant", "input")
+        is_sine = node.operation in ("sin", "cos")
+        if is_source or (not is_sine and found.issuperset(node.arguments)):
+            found.add(k)
+    return sorted(found)
+
+
+def _sincos_in_lanes(body: Body, angles: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
+    """Return sine and cosine of single numbers, computed as the lanes of vectors."""
+    results: list[tuple[Vector, Vector]] = []
+    lanes = Body(body.liberties, WIDTH, body.lines)
+    for start in range(0, len(angles), WIDTH):
+        part = angles[start : start + WIDTH]
+        name = "poison"
+        for lane in range(WIDTH):
+            # Lanes that are left over repeat the last angle.
+            angle = part[min(lane, len(part) - 1)]
+            insert = f"insertelement {lanes.number_type} {name}, double {angle.name}, i64 {lane}"
+            name = body.define(insert)
+        sine, cosine = sincos(Vector(lanes, name))
+
+        def entry(of: Vector, lane: int) -> Vector:
+            extract = f"extractelement {lanes.number_type} {of.name}, i64 {lane}"
+            return Vector(body, body.define(extract))
+
+        results += [(entry(sine, lane), entry(cosine, lane)) for lane in range(len(part))]
+    return results
 
 
 def _apply(operation: str, arguments: Sequence[_Value]) -> _Value:
@@ -212,7 +281,7 @@ def _number(value: _Value) -> Vector:
     return (
         value
         if isinstance(value, Vector)
-        else select(value, Vector(value.body, constant(1.0)), 0.0)
+        else select(value, Vector(value.body, value.body.constant(1.0)), 0.0)
     )
 
 
@@ -225,8 +294,9 @@ def _broadcast(k: int) -> Iterator[str]:
     """Yield the lines that copy parameter K into all lanes of ``%pK``."""
     yield f"  %p{k}_at = getelementptr double, ptr %parameters, i64 {k}"
     yield f"  %p{k}_value = load double, ptr %p{k}_at"
-    yield f"  %p{k}_lane = insertelement {VECTOR} poison, double %p{k}_value, i64 0"
-    yield f"  %p{k} = shufflevector {VECTOR} %p{k}_lane, {VECTOR} poison, <{WIDTH} x i32> zeroinitializer"
+    vector = f"<{WIDTH} x double>"
+    yield f"  %p{k}_lane = insertelement {vector} poison, double %p{k}_value, i64 0"
+    yield f"  %p{k} = shufflevector {vector} %p{k}_lane, {vector} poison, <{WIDTH} x i32> zeroinitializer"
 
 
 def _array(k: int, name: str) -> Iterator[str]:
@@ -243,7 +313,9 @@ def _address(body: Body, row: int) -> str:
 
 
 def _loaded(body: Body, row: int) -> Vector:
-    return Vector(body, body.define(f"load {VECTOR}, ptr {_address(body, row)}, align 64"))
+    return Vector(
+        body, body.define(f"load {body.number_type}, ptr {_address(body, row)}, align 64")
+    )
 
 
 def _copied(

@@ -61,6 +61,21 @@ def compile_module(source: str, target: tuple[str, str, str] | None = None) -> b
     return code
 
 
+class CompiledCall:
+    """The function ``call`` of object code of this processor, which Python calls; see :mod:`dhkit.kernels.call_source`.
+
+    The code is trusted: other bytes may end the process.
+
+    Raises
+    ------
+    RuntimeError
+        LLVM refuses the code, or it has no such function.
+    """
+
+    def __init__(self, code: bytes) -> None:
+        self._engine, self.address = _loaded(code, "call")
+
+
 class CompiledFunction:
     """The function ``kernel`` of object code of this processor, called with arrays without Python's lock.
 
@@ -73,13 +88,7 @@ class CompiledFunction:
     """
 
     def __init__(self, code: bytes) -> None:
-        _start()
-        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine(*processor()))
-        self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-        self._engine.finalize_object()
-        place = self._engine.get_function_address("kernel")
-        if not place:
-            raise RuntimeError("object code without a function named kernel")
+        self._engine, place = _loaded(code, "kernel")
         self._function = _SIGNATURE(place)
         self._single_item: Stages | None = None
         """Arrays for single items, made at the first one."""
@@ -135,6 +144,18 @@ class CompiledFunction:
         arguments = (address(parameters), address(addresses), address(work), len(arrays[0]))
         kept = (parameters, arrays, addresses, work)
         return lambda function=self._function, kept=kept: function(*arguments)  # type: ignore[misc]
+
+
+def _loaded(code: bytes, name: str) -> tuple[Any, int]:
+    """Return the owner of loaded object code, which must be kept, and the address of a function in it."""
+    _start()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine(*processor()))
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    place = engine.get_function_address(name)
+    if not place:
+        raise RuntimeError(f"object code without a function named {name}")
+    return engine, place
 
 
 @cache

@@ -21,6 +21,30 @@ def in_threads(
 
     ``function`` must not call this again with more than one thread, because all of them may be waiting. When it raises,
     or the caller stops, items that have not begun are dropped, and running ones are waited for.
+
+    Parameters
+    ----------
+    function
+        Function of one item.
+    items
+        Items; no more than ``threads`` are taken ahead.
+    threads
+        Number of threads.
+
+    Yields
+    ------
+    Result
+        The result of each item, in the items' order.
+
+    Raises
+    ------
+    Exception
+        What the function raised.
+
+    Examples
+    --------
+    >>> list(in_threads(abs, [-1, 2, -3], threads=2))
+    [1, 2, 3]
     """
     if threads < 2:
         yield from map(function, items)
@@ -40,6 +64,25 @@ def all_in_threads(function: Callable[[Item], object], items: Sequence[Item]) ->
     """Call a function with all items at once, one thread each, the first in the caller's.
 
     When this returns or raises, no thread works on an item any more.
+
+    Parameters
+    ----------
+    function
+        Function of one item.
+    items
+        Items, at least one.
+
+    Raises
+    ------
+    Exception
+        What the function raised for one of the items.
+
+    Examples
+    --------
+    >>> done = []
+    >>> all_in_threads(done.append, [1, 2, 3])
+    >>> sorted(done)
+    [1, 2, 3]
     """
     first, *others = items
     pending: list[Future[object]] = []

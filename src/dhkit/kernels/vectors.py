@@ -1,4 +1,7 @@
-"""Vectors of doubles as values of LLVM's intermediate representation: operators write lines of a straight-line body."""
+"""Doubles as values of LLVM's intermediate representation: operators write lines of a straight-line body.
+
+A body's values are vectors of several doubles, one for each item of a batch, or single doubles.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,6 @@ from typing import TypeAlias
 
 WIDTH = 8
 """Number of doubles of a vector: one register of AVX-512, two of AVX, four of SSE and NEON."""
-VECTOR = f"<{WIDTH} x double>"
-_MASK = f"<{WIDTH} x i1>"
 
 FUSING = "contract nsz"
 """Liberties for LLVM: fuse products into sums, and drop the sign of zero. No others, so that NaN survives."""
@@ -19,10 +20,37 @@ EXACT = "nsz"
 
 @dataclass
 class Body:
-    """The lines written so far; each defines one value."""
+    """The lines written so far; each defines one value, of ``width`` doubles or truth values."""
 
     liberties: str = FUSING
+    width: int = WIDTH
     lines: list[str] = field(default_factory=list)
+
+    @property
+    def number_type(self) -> str:
+        """LLVM's type of numbers."""
+        return "double" if self.width == 1 else f"<{self.width} x double>"
+
+    @property
+    def truth_type(self) -> str:
+        """LLVM's type of truth values."""
+        return "i1" if self.width == 1 else f"<{self.width} x i1>"
+
+    def declarations(self) -> list[str]:
+        """Return the declarations of LLVM's functions that a body may call."""
+        kind = self.number_type
+        return [
+            f"declare {kind} {self.intrinsic(name)}({kind})" for name in ("fabs", "sqrt", "floor")
+        ]
+
+    def intrinsic(self, name: str) -> str:
+        """Return LLVM's name of a function of one number."""
+        return f"@llvm.{name}.f64" if self.width == 1 else f"@llvm.{name}.v{self.width}f64"
+
+    def constant(self, value: float) -> str:
+        """Return a double as LLVM's text, by its bits, for all lanes."""
+        (bits,) = struct.unpack("<Q", struct.pack("<d", value))
+        return f"0x{bits:016X}" if self.width == 1 else f"splat (double 0x{bits:016X})"
 
     def define(self, instruction: str) -> str:
         """Append an instruction and return the name of its value."""
@@ -33,18 +61,20 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Vector:
-    """``WIDTH`` doubles. Comparisons with ``<``, ``<=``, :meth:`equals` and :meth:`differs` return a :class:`Mask`."""
+    """As many doubles as the body's width.
+
+    Comparisons with ``<``, ``<=``, :meth:`equals` and :meth:`differs` return a :class:`Mask`.
+    """
 
     body: Body
     name: str
     """Name of the value, or text of a constant."""
 
     def _with(self, instruction: str, other: Number, *, swapped: bool = False) -> str:
-        first = self.name
-        second = _text(other)
-        return self.body.define(
-            f"{instruction} {VECTOR} {f'{second}, {first}' if swapped else f'{first}, {second}'}"
-        )
+        operands = [self.name, _text(self.body, other)]
+        if swapped:
+            operands.reverse()
+        return self.body.define(f"{instruction} {self.body.number_type} {', '.join(operands)}")
 
     def __add__(self, other: Number) -> Vector:
         return Vector(self.body, self._with(f"fadd {self.body.liberties}", other))
@@ -66,7 +96,8 @@ class Vector:
 
     def __neg__(self) -> Vector:
         return Vector(
-            self.body, self.body.define(f"fneg {self.body.liberties} {VECTOR} {self.name}")
+            self.body,
+            self.body.define(f"fneg {self.body.liberties} {self.body.number_type} {self.name}"),
         )
 
     # Ordered comparisons with NaN are false; ``differs`` is true.
@@ -90,10 +121,9 @@ class Vector:
 
     def call(self, intrinsic: str) -> Vector:
         """Return one of LLVM's functions of one number: fabs, sqrt or floor."""
-        function = f"@llvm.{intrinsic}.v{WIDTH}f64({VECTOR} {self.name})"
-        return Vector(
-            self.body, self.body.define(f"call {self.body.liberties} {VECTOR} {function}")
-        )
+        kind = self.body.number_type
+        call = f"call {self.body.liberties} {kind} {self.body.intrinsic(intrinsic)}({kind} {self.name})"
+        return Vector(self.body, self.body.define(call))
 
 
 Number: TypeAlias = Vector | float
@@ -101,35 +131,35 @@ Number: TypeAlias = Vector | float
 
 @dataclass(frozen=True, eq=False)
 class Mask:
-    """``WIDTH`` truth values."""
+    """As many truth values as the body's width."""
 
     body: Body
     name: str
 
     def __and__(self, other: Mask) -> Mask:
-        return Mask(self.body, self.body.define(f"and {_MASK} {self.name}, {other.name}"))
+        return Mask(
+            self.body, self.body.define(f"and {self.body.truth_type} {self.name}, {other.name}")
+        )
 
     def __or__(self, other: Mask) -> Mask:
-        return Mask(self.body, self.body.define(f"or {_MASK} {self.name}, {other.name}"))
+        return Mask(
+            self.body, self.body.define(f"or {self.body.truth_type} {self.name}, {other.name}")
+        )
 
     def __invert__(self) -> Mask:
-        return Mask(self.body, self.body.define(f"xor {_MASK} {self.name}, splat (i1 true)"))
+        true = "true" if self.body.width == 1 else "splat (i1 true)"
+        return Mask(self.body, self.body.define(f"xor {self.body.truth_type} {self.name}, {true}"))
 
 
-def constant(value: float) -> str:
-    """Return a double as LLVM's text, by its bits, for all lanes."""
-    (bits,) = struct.unpack("<Q", struct.pack("<d", value))
-    return f"splat (double 0x{bits:016X})"
-
-
-def _text(number: Number) -> str:
-    return number.name if isinstance(number, Vector) else constant(number)
+def _text(body: Body, number: Number) -> str:
+    return number.name if isinstance(number, Vector) else body.constant(number)
 
 
 def select(condition: Mask, true: Number, false: Number) -> Vector:
     """Return one of two values in each lane, without a branch."""
     body = condition.body
-    choice = f"select {body.liberties} {_MASK} {condition.name}, {VECTOR} {_text(true)}, {VECTOR} {_text(false)}"
+    values = ", ".join(f"{body.number_type} {_text(body, value)}" for value in (true, false))
+    choice = f"select {body.liberties} {body.truth_type} {condition.name}, {values}"
     return Vector(body, body.define(choice))
 
 

@@ -1,0 +1,101 @@
+"""The quantities of an arm that single calls get from compiled functions; see :mod:`dhkit.kernels.single_calls`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import NamedTuple
+
+from dhkit.description import Array, Description
+from dhkit.dynamics.programs import dynamics_kernel
+from dhkit.errors import DescriptionError
+from dhkit.kernels import Kernel
+from dhkit.kernels.single_calls import FastCall, SingleCall, never
+from dhkit.kinematics.forward import frames_kernel, tool_kernel
+from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
+
+
+class _Quantity(NamedTuple):
+    kernel: Callable[[Description], tuple[Kernel, Array]]
+    tail: Callable[[int], tuple[int, ...]]
+    """Axes of the result after those of the batch, for n joints."""
+    refuses_nan: bool = False
+
+
+def _dynamic(
+    name: str, tail: Callable[[int], tuple[int, ...]], refuses_nan: bool = False
+) -> _Quantity:
+    return _Quantity(partial(dynamics_kernel, name), tail, refuses_nan)
+
+
+_QUANTITIES: Mapping[str, _Quantity] = {
+    "fk": _Quantity(tool_kernel, lambda _: (4, 4)),
+    "frames": _Quantity(frames_kernel, lambda n: (n + 1, 4, 4)),
+    "jacobian": _Quantity(lambda arm: jacobian_kernel(arm, "world"), lambda n: (6, n)),
+    "jacobian_dot": _Quantity(lambda arm: jacobian_dot_kernel(arm, "world"), lambda n: (6, n)),
+    "mass_matrix": _dynamic("mass_matrix", lambda n: (n, n)),
+    "coriolis_matrix": _dynamic("coriolis_matrix", lambda n: (n, n)),
+    "gravity_torque": _dynamic("gravity_torque", lambda n: (n,)),
+    "bias": _dynamic("bias", lambda n: (n,)),
+    "inverse_dynamics": _dynamic("inverse_dynamics", lambda n: (n,)),
+    # The ordinary way says why an acceleration is missing.
+    "forward_dynamics": _dynamic("forward_dynamics", lambda n: (n,), refuses_nan=True),
+}
+"""Quantities by the name of the arm's method, for its default options."""
+
+
+class ArmCalls:
+    """Functions of single states of one arm, by the names of its methods.
+
+    Each takes the states, and ``out`` or None, all by position, and returns None for whatever it does not take.
+    """
+
+    fk: FastCall
+    frames: FastCall
+    jacobian: FastCall
+    jacobian_dot: FastCall
+    mass_matrix: FastCall
+    coriolis_matrix: FastCall
+    gravity_torque: FastCall
+    bias: FastCall
+    inverse_dynamics: FastCall
+    forward_dynamics: FastCall
+
+    def __init__(self, description: Description) -> None:
+        self._description = description
+
+    def __getattr__(self, name: str) -> FastCall:
+        """Return the function of a quantity that is asked for the first time."""
+        if name not in _QUANTITIES:
+            raise AttributeError(name)
+        call = self._single_call(name)
+        setattr(self, name, never if call is None else call)
+        function: FastCall = self.__dict__[name]
+        return function
+
+    def compile(self) -> Iterator[str]:
+        """Compile every quantity now, and yield its name."""
+        for name in _QUANTITIES:
+            call = self._single_call(name)
+            if call is not None:
+                call.compile()
+            yield name
+
+    def count(self) -> int:
+        """Return the number of quantities."""
+        return len(_QUANTITIES)
+
+    def _single_call(self, name: str) -> SingleCall | None:
+        """Return a quantity that is not compiled yet; None of dynamics without bodies, whose ordinary way says so."""
+        quantity = _QUANTITIES[name]
+        try:
+            kernel, parameters = quantity.kernel(self._description)
+        except DescriptionError:
+            return None
+        return SingleCall(
+            kernel,
+            parameters,
+            quantity.tail(self._description.n),
+            install=partial(setattr, self, name),
+            refuses_nan=quantity.refuses_nan,
+        )

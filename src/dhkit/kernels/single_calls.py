@@ -1,0 +1,261 @@
+"""Calls for one state or a few, in a fraction of a microsecond: a program as a built-in function of Python.
+
+A kernel's ordinary way spends 6 to 10 microseconds on checking, converting and allocating arrays. The function here is
+machine code with CPython's own signature (``METH_FASTCALL``), see :mod:`dhkit.kernels.call_source`. It answers None for
+whatever it does not take (lists, other types and layouts, large batches, errors), and the caller goes the ordinary way.
+It is made after ``CALLS_BEFORE_COMPILING`` calls, in a thread, so that no call waits for it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import sys
+import sysconfig
+import threading
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.kernels.call_source import (
+    AXES_OFFSET,
+    DATA_OFFSET,
+    DTYPE_OFFSET,
+    FLAGS_OFFSET,
+    SHAPE_OFFSET,
+    TYPE_OFFSET,
+)
+from dhkit.kernels.kernel import Kernel, kernel_mode
+from dhkit.kernels.machine_code import CompiledCall
+
+log = logging.getLogger(__name__)
+
+CALLS_BEFORE_COMPILING = 200
+"""A quantity is compiled for single calls when so many were made: they took about as long as compiling takes."""
+
+_METH_FASTCALL = 0x0080
+_NUMPY_ABI = 0x02000000
+"""NumPy's binary interface, the same for all versions 2.x."""
+_GET_ABI = 0
+_ARRAY_TYPE = 2
+_NEW_ARRAY = 93
+"""Indices in NumPy's C interface: ``PyArray_GetNDArrayCVersion``, ``PyArray_Type`` and ``PyArray_New``."""
+_AGREEMENT = 1e-9
+"""Largest difference from the ordinary way at which a new function is used, relative to the largest entry."""
+
+FastCall: TypeAlias = Callable[..., Array | None]
+"""Takes the states and ``out`` or None; returns the result, or None of arguments that it does not take."""
+
+
+def never(*_: object) -> None:
+    """Take no arguments: every call goes the ordinary way."""
+
+
+class SingleCall:
+    """A quantity of one robot while it is not compiled: it counts calls, takes none, and replaces itself.
+
+    Parameters
+    ----------
+    kernel, parameters
+        The program, with one output, and the robot's values of its parameters, shape (p,).
+    tail
+        Axes of the result after those of the batch.
+    install
+        Called with the compiled function, or with :func:`never` if it cannot be made here.
+    refuses_nan
+        Whether a result that is not finite goes the ordinary way, which says why.
+    """
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        parameters: Array,
+        tail: tuple[int, ...],
+        install: Callable[[FastCall], None],
+        refuses_nan: bool = False,
+    ) -> None:
+        self._kernel = kernel
+        self._parameters = parameters
+        self._tail = tail
+        self._install = install
+        self._refuses_nan = refuses_nan
+        self._calls = 0
+        self._thread: threading.Thread | None = None
+
+    def __call__(self, *arguments: object) -> Array | None:
+        """Count a call; return None, or the result where ``DHKIT_KERNELS`` is ``on``."""
+        mode = kernel_mode()
+        if mode == "on":
+            return self.compile()(*arguments)
+        if mode == "off":
+            self._install(never)
+            return None
+        self._calls += 1
+        if self._calls % CALLS_BEFORE_COMPILING == 0:
+            self._start()
+        return None
+
+    def compile(self) -> FastCall:
+        """Make the function now and install it; :func:`never` if it cannot be made here."""
+        function = self._compiled()
+        self._install(function)
+        return function
+
+    def _start(self) -> None:
+        """Compile in a thread, unless one is at work; after a fork, the parent's thread is not alive in the child."""
+        if self._thread is not None and self._thread.is_alive():
+            return
+        self._thread = threading.Thread(
+            target=self.compile, name=f"compile {self._kernel.name}", daemon=False
+        )
+        try:
+            self._thread.start()
+        except RuntimeError:
+            # The interpreter is shutting down.
+            self._thread = None
+
+    def _compiled(self) -> FastCall:
+        if kernel_mode() == "off" or not is_supported():
+            return never
+        code = self._kernel.compiled_call(self._tail, self._refuses_nan)
+        if code is None:
+            return never
+        function = _bound(code, self._parameters)
+        if not self._agrees(function):
+            log.warning(
+                "%s: the function for single calls differs from the ordinary way, and is not used",
+                self._kernel.name,
+            )
+            return never
+        return function
+
+    def _agrees(self, function: FastCall) -> bool:
+        """Whether a function gives the kernel's result at a random state, and takes no list."""
+        rng = np.random.default_rng(0)
+        states = [rng.uniform(-1.0, 1.0, size) for size in self._kernel.state_sizes()]
+        expected = np.empty(self._tail)
+        self._kernel(self._parameters, [state[None] for state in states], [expected.reshape(1, -1)])
+        result = function(*states, None)
+        if function(*(state.tolist() for state in states), None) is not None:
+            return False
+        if result is None:
+            return self._refuses_nan and not np.isfinite(expected).all()
+        scale = float(np.abs(expected).max(initial=1.0))
+        return np.allclose(result, expected, rtol=0.0, atol=_AGREEMENT * scale, equal_nan=True)
+
+
+class _Context(np.ndarray[Any, Any]):
+    """Addresses that a function reads, see ``CONTEXT``; it keeps what they point to."""
+
+    kept: tuple[object, ...] = ()
+
+
+class _MethodDefinition(ctypes.Structure):
+    """Python's ``PyMethodDef``."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("function", ctypes.c_void_p),
+        ("flags", ctypes.c_int),
+        ("doc", ctypes.c_char_p),
+    )
+
+
+def _bound(code: CompiledCall, parameters: Array) -> FastCall:
+    """Return machine code as a built-in function with these parameters.
+
+    The function refers to its context, and the context to the code, the definition and the numbers: all live as long as
+    the function does.
+    """
+    numbers = np.array(parameters, dtype=float, order="C")
+    context = np.array(
+        [
+            id(np.ndarray),
+            id(np.dtype(np.float64)),
+            _numpy_interface()[_NEW_ARRAY],
+            _python_function("Py_IncRef"),
+            _python_function("Py_DecRef"),
+            id(None),
+            numbers.ctypes.data,
+        ],
+        dtype=np.uintp,
+    ).view(_Context)
+    definition = _MethodDefinition(b"single_call", code.address, _METH_FASTCALL, b"")
+    context.kept = (code, definition, numbers)
+    make = ctypes.pythonapi.PyCFunction_NewEx
+    make.restype = ctypes.py_object
+    make.argtypes = [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]
+    function: FastCall = make(ctypes.addressof(definition), context, None)
+    return function
+
+
+# What the machine code assumes of Python and NumPy
+
+
+@cache
+def is_supported() -> bool:
+    """Whether objects lie in memory here as the machine code reads them."""
+    return (
+        sys.implementation.name == "cpython"
+        and not sysconfig.get_config_var("Py_GIL_DISABLED")
+        and sys.maxsize == 2**63 - 1
+        and sys.byteorder == "little"
+        and _is_main_interpreter()
+        and _has_known_layout()
+    )
+
+
+def _is_main_interpreter() -> bool:
+    """Whether this is the process's first interpreter: the objects of another one have other addresses."""
+    api = ctypes.pythonapi
+    for function in (api.PyInterpreterState_Get, api.PyInterpreterState_Main):
+        function.restype = ctypes.c_void_p
+        function.argtypes = []
+    found: bool = api.PyInterpreterState_Get() == api.PyInterpreterState_Main()
+    return found
+
+
+def _has_known_layout() -> bool:
+    """Whether NumPy's interface and array struct are those of ``CONTEXT`` and the offsets, by a look at an array."""
+    try:
+        interface = _numpy_interface()
+    except (AttributeError, ValueError):
+        return False
+    abi = ctypes.CFUNCTYPE(ctypes.c_uint)(interface[_GET_ABI])()
+    if abi != _NUMPY_ABI or interface[_ARRAY_TYPE] != id(np.ndarray):
+        return False
+    array = np.zeros((2, 3, 5))
+    shape = _read(id(array) + SHAPE_OFFSET, ctypes.c_void_p)
+    return (
+        _read(id(array) + TYPE_OFFSET, ctypes.c_void_p) == id(np.ndarray)
+        and _read(id(array) + DATA_OFFSET, ctypes.c_void_p) == array.ctypes.data
+        and _read(id(array) + AXES_OFFSET, ctypes.c_int) == array.ndim
+        and tuple(_read(shape + 8 * k, ctypes.c_int64) for k in range(3)) == array.shape
+        and _read(id(array) + DTYPE_OFFSET, ctypes.c_void_p) == id(np.dtype(np.float64))
+        and _read(id(array) + FLAGS_OFFSET, ctypes.c_int) == array.flags.num
+    )
+
+
+def _read(address: int, kind: Any) -> Any:
+    return kind.from_address(address).value
+
+
+@cache
+def _numpy_interface() -> Any:
+    """Return NumPy's table of C functions and types."""
+    from numpy._core import _multiarray_umath  # type: ignore[attr-defined]
+
+    get = ctypes.pythonapi.PyCapsule_GetPointer
+    get.restype = ctypes.c_void_p
+    get.argtypes = [ctypes.py_object, ctypes.c_char_p]
+    table = get(_multiarray_umath._ARRAY_API, None)
+    return ctypes.cast(table, ctypes.POINTER(ctypes.c_void_p))
+
+
+def _python_function(name: str) -> int:
+    address = ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value
+    assert address is not None  # noqa: S101 - a function that Python exports
+    return address

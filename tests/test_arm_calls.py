@@ -1,0 +1,382 @@
+"""Single calls of an arm's methods: compiled functions that give the ordinary way's values and exceptions."""
+
+import copy
+import gc
+import os
+import pickle
+import resource
+import subprocess
+import sys
+import threading
+import types
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import acceptance
+from acceptance import DIFFERENT_ROBOTS, only_accepting
+from dhkit import Arm, dynamics, kinematics
+from dhkit.kernels import single_calls
+from dhkit.kernels.call_source import MAX_ITEMS
+from random_arms import arms, tables
+
+STATES = {
+    "fk": 1,
+    "frames": 1,
+    "jacobian": 1,
+    "jacobian_dot": 2,
+    "mass_matrix": 1,
+    "coriolis_matrix": 2,
+    "gravity_torque": 1,
+    "bias": 2,
+    "inverse_dynamics": 3,
+    "forward_dynamics": 3,
+}
+"""Methods by name, and how many joint vectors they take."""
+
+
+def ordinary(method):
+    """Return the function behind a method of Arm."""
+    if method == "fk":
+        return kinematics.forward_kinematics
+    return getattr(kinematics, method, None) or getattr(dynamics, method)
+
+
+def compiled(arm):
+    for _ in arm._calls.compile():
+        pass
+    return arm
+
+
+@pytest.fixture(scope="module")
+def puma():
+    return compiled(Arm.load("puma560"))
+
+
+def is_builtin(function):
+    return isinstance(function, types.BuiltinFunctionType)
+
+
+@pytest.mark.parametrize("name", DIFFERENT_ROBOTS)
+def test_values_are_those_of_the_ordinary_way(name, law):
+    arm = compiled(Arm.load(name))
+    rng = np.random.default_rng(0)
+    for method, count in STATES.items():
+        fast = getattr(arm._calls, method)
+        if not is_builtin(fast):
+            assert not all(joint.bodies for joint in arm.description.joints)
+            continue
+        for items in (None, 1, 2, 7, MAX_ITEMS):
+            shape = (arm.n,) if items is None else (items, arm.n)
+            for _ in range(law.samples(200, quick=3)):
+                states = rng.normal(scale=rng.choice([1e-3, 1.0, 100.0]), size=(count, *shape))
+                expected = ordinary(method)(arm, *states)
+                found = fast(*states, None)
+                assert found is not None and found.shape == expected.shape
+                assert found.flags.c_contiguous and found.flags.owndata
+                scale = np.abs(expected).max(initial=1.0)
+                law.holds(method, np.abs(found - expected).max() / scale, 1e-11)
+                out = np.empty_like(expected)
+                assert fast(*states, out) is out
+                assert np.array_equal(out, found)
+
+
+@settings(max_examples=acceptance.sample_size(100, quick=3))
+@given(arms())
+def test_random_arms(description):
+    arm = compiled(Arm(description))
+    q, qd, qdd = np.random.default_rng(1).normal(size=(3, arm.n))
+    for method, count in STATES.items():
+        states = (q, qd, qdd)[:count]
+        expected = ordinary(method)(arm, *states)
+        found = getattr(arm._calls, method)(*states, None)
+        if found is None:
+            assert method == "forward_dynamics" and not np.isfinite(expected).all()
+        else:
+            scale = np.abs(expected).max(initial=1.0)
+            assert np.allclose(found, expected, rtol=0, atol=1e-8 * scale), method
+
+
+@settings(max_examples=3)
+@given(tables())
+def test_arms_without_bodies_say_so_as_before(description):
+    arm = compiled(Arm(description))
+    q = np.zeros(arm.n)
+    assert is_builtin(arm._calls.fk)
+    assert_same(outcome(arm.mass_matrix, q), outcome(dynamics.mass_matrix, arm, q))
+
+
+class Subclass(np.ndarray):
+    pass
+
+
+def unusual(rng, n, tmp_path):
+    """Yield joint vectors as callers may have them: types, layouts, classes, sizes and values."""
+    q = rng.normal(size=n)
+    yield q.tolist()
+    yield tuple(q)
+    yield q.astype(np.float32)
+    yield q.astype(np.longdouble)
+    yield np.ones(n, dtype=int)
+    yield np.ones(n, dtype=bool)
+    yield q.astype(complex)
+    yield q.astype(object)
+    yield q.astype(">f8")
+    yield q.astype(str)
+    yield np.array([None] * n)
+    yield np.repeat(q, 2)[::2]
+    yield q[::-1]
+    yield np.broadcast_to(q[:1], (n,))
+    yield np.broadcast_to(q, (3, n))
+    yield np.asfortranarray(rng.normal(size=(3, n)))
+    yield rng.normal(size=(3, 2 * n))[:, ::2]
+    yield q.view(Subclass)
+    yield np.matrix(q)
+    yield np.ma.masked_array(q, mask=[True] + [False] * (n - 1))
+    kept = np.memmap(tmp_path / "states", dtype=float, mode="w+", shape=(n,))
+    kept[:] = q
+    yield kept
+    still = q.copy()
+    still.flags.writeable = False
+    yield still
+    unaligned = np.zeros(8 * n + 1, dtype=np.uint8)[1:].view(float)
+    yield unaligned
+    for shape in ((), (0,), (n - 1,), (n + 1,), (0, n), (1, n), (MAX_ITEMS + 1, n), (2, 3, n)):
+        yield rng.normal(size=shape)
+    for value in (np.nan, np.inf, -np.inf, 1e6, np.nextafter(1e6, 2e6), 1e300, 5e-324, -0.0):
+        with_value = q.copy()
+        with_value[-1] = value
+        yield with_value
+    yield "ready"
+    yield "nonsense"
+    yield ["ready", "zero"]
+    yield None
+    yield {}
+    yield 3.0
+    yield np.datetime64("2020-01-01")
+
+
+def outcome(function, *arguments, **options):
+    """Return a call's value, or its exception's type and text."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return function(*arguments, **options)
+    except Exception as error:
+        return type(error), str(error)
+
+
+def assert_same(found, expected):
+    if isinstance(expected, tuple):
+        assert found == expected
+    else:
+        assert type(found) is type(expected) and found.shape == expected.shape
+        scale = np.nan_to_num(np.abs(expected), posinf=1.0).max(initial=1.0)
+        assert np.allclose(found, expected, rtol=1e-9, atol=1e-9 * scale, equal_nan=True)
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
+def test_unusual_arguments_give_the_same_values_and_exceptions(puma, tmp_path, law):
+    for seed in range(law.samples(50, quick=1)):
+        rng = np.random.default_rng(seed)
+        plain = rng.normal(size=puma.n)
+        for method, count in STATES.items():
+            for place in range(count):
+                for value in unusual(rng, puma.n, tmp_path):
+                    states = [plain] * count
+                    states[place] = value
+                    found = outcome(getattr(puma, method), *states)
+                    assert_same(found, outcome(ordinary(method), puma, *states))
+
+
+def test_unusual_results_give_the_same_values_and_exceptions(puma, law):
+    rng = np.random.default_rng(2)
+    for method, count in STATES.items():
+        for items in (None, 5):
+            shape = (puma.n,) if items is None else (items, puma.n)
+            states = rng.normal(size=(count, *shape))
+            result = ordinary(method)(puma, *states)
+            still = np.empty_like(result)
+            still.flags.writeable = False
+            for out in (
+                still,
+                np.empty((*result.shape, 2))[..., 0],
+                np.empty(result.shape, dtype=np.float32),
+                np.empty(result.shape, dtype=">f8"),
+                np.empty(result.shape).view(Subclass),
+                np.empty((1, *result.shape)),
+                np.empty(result.shape[1:]),
+                np.empty(result.size + 1),
+                np.broadcast_to(np.empty(1), result.shape),
+                np.asfortranarray(np.empty((*result.shape, 2)))[..., 0],
+                [],
+                "out",
+            ):
+                found = outcome(getattr(puma, method), *states, out=out)
+                assert_same(found, outcome(ordinary(method), puma, *states, out=out))
+            assert_same(
+                outcome(getattr(puma, method), *states, threads=0),
+                outcome(ordinary(method), puma, *states, threads=0),
+            )
+
+
+def test_a_result_may_lie_where_an_input_lies(puma):
+    rng = np.random.default_rng(3)
+    for items in (None, 9):
+        size = 1 if items is None else items
+        for method, count in STATES.items():
+            shape = (puma.n,) if items is None else (items, puma.n)
+            states = rng.normal(size=(count, *shape))
+            expected = ordinary(method)(puma, *states)
+            for place in range(count):
+                for shift in (0, 1, puma.n):
+                    # One block of memory holds the input at ``shift`` and the result at its start.
+                    memory = np.zeros(shift + expected.size + size * puma.n)
+                    own = list(states)
+                    own[place] = memory[shift : shift + states[place].size].reshape(shape)
+                    own[place][...] = states[place]
+                    out = memory[: expected.size].reshape(expected.shape)
+                    getattr(puma, method)(*own, out=out)
+                    assert np.allclose(out, expected, rtol=1e-9, atol=1e-9), (method, shift)
+
+
+def test_a_missing_acceleration_is_explained_by_the_ordinary_way(caplog):
+    arm = compiled(Arm.load("puma560"))
+    q = np.full(6, np.nan)
+    assert arm._calls.forward_dynamics(q, q, q, None) is None
+    out = np.ones(6)
+    assert arm._calls.forward_dynamics(q, q, q, out) is None and (out == 1.0).all()
+    assert np.isnan(arm.forward_dynamics(q, q, q)).all()
+
+
+def test_a_quantity_is_compiled_after_some_calls_and_never_in_the_callers_way():
+    arm = Arm.load("planar2r")
+    q = np.zeros(2)
+    before = arm.fk(q)
+    if not is_builtin(arm._calls.fk):
+        for _ in range(single_calls.CALLS_BEFORE_COMPILING):
+            arm.fk(q)
+        for thread in threading.enumerate():
+            if thread.name == "compile forward_kinematics":
+                thread.join()
+    assert is_builtin(arm._calls.fk)
+    assert np.allclose(arm.fk(q), before, rtol=0, atol=1e-15)
+
+
+def test_copies_and_pickles_of_an_arm_have_functions_of_their_own(puma):
+    q = np.linspace(-1, 1, 6)
+    for twin in (copy.copy(puma), copy.deepcopy(puma), pickle.loads(pickle.dumps(puma))):
+        assert twin == puma and np.allclose(twin.fk(q), puma.fk(q), rtol=0, atol=1e-15)
+
+
+def test_a_function_outlives_its_arm():
+    arm = compiled(Arm.load("planar2r"))
+    q = np.array([0.1, 0.2])
+    expected = arm.fk(q)
+    function = arm._calls.fk
+    del arm
+    gc.collect()
+    filler = [np.zeros(64) for _ in range(1000)]
+    assert np.array_equal(function(q, None), expected) and filler
+
+
+def test_threads_share_a_function(puma):
+    q = np.random.default_rng(5).normal(size=(8, 500, 6))
+    expected = [[puma.fk(state) for state in states] for states in q]
+    found = [None] * 8
+
+    def work(k):
+        found[k] = [puma.fk(state) for state in q[k]]
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert np.array_equal(found, expected)
+
+
+def test_calls_leave_no_memory_behind(puma, law):
+    q, qd, qdd = np.random.default_rng(6).normal(size=(3, 6))
+    out = np.empty((4, 4))
+    missing = np.full(6, np.nan)
+    references = [sys.getrefcount(x) for x in (None, q, out, missing, np.ndarray)]
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for _ in range(law.samples(25_000_000, quick=50_000)):
+        puma.fk(q)
+        puma.fk(q, out)
+        puma.inverse_dynamics(q, qd, qdd)
+        puma._calls.forward_dynamics(missing, qd, qdd, None)
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    assert grown < 4_000, f"{grown} KB"
+    after = [sys.getrefcount(x) for x in (None, q, out, missing, np.ndarray)]
+    assert np.abs(np.subtract(after, references)).max() < 100
+
+
+NEW_PROCESS = """
+import os, sys, threading
+import numpy as np
+from dhkit import Arm
+arm = Arm.load("planar2r")
+q = np.array([0.1, 0.2])
+for _ in range(300):
+    arm.fk(q)
+{then}
+"""
+
+
+def in_new_process(then, **environment):
+    return subprocess.run(
+        [sys.executable, "-c", NEW_PROCESS.format(then=then)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+        check=False,
+        timeout=120,
+    )
+
+
+def test_a_process_that_ends_while_it_compiles_ends_well(tmp_path):
+    done = in_new_process("", DHKIT_CACHE_DIR=str(tmp_path))
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("mode", "kind"), [("on", "builtin_function_or_method"), ("off", "function")]
+)
+def test_kernels_on_compiles_at_once_and_off_never(mode, kind):
+    done = in_new_process("print(type(arm._calls.fk).__name__)", DHKIT_KERNELS=mode)
+    assert (done.returncode, done.stdout.strip()) == (0, kind), done.stderr
+
+
+def test_a_forked_process_compiles_for_itself(tmp_path):
+    done = in_new_process(
+        "pid = os.fork()\n"
+        "for _ in range(300): arm.fk(q); arm.mass_matrix(q)\n"
+        "for t in threading.enumerate():\n"
+        "    if t is not threading.current_thread(): t.join()\n"
+        "print(type(arm._calls.mass_matrix).__name__, flush=True)\n"
+        "if pid: assert os.waitpid(pid, 0)[1] == 0\n",
+        DHKIT_CACHE_DIR=str(tmp_path),
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == ["builtin_function_or_method"] * 2
+
+
+def test_objects_that_lie_elsewhere_in_memory_are_not_read(monkeypatch):
+    monkeypatch.setattr(single_calls, "FLAGS_OFFSET", single_calls.FLAGS_OFFSET + 8)
+    assert not single_calls._has_known_layout()
+
+
+@only_accepting
+def test_the_debug_allocator_finds_no_bad_access(tmp_path):
+    """Run with Python's debug allocator, which fills freed memory and checks the borders of blocks."""
+    done = in_new_process(
+        "for _ in range(100_000): arm.fk(q); arm.fk(q, np.empty((4, 4)))",
+        PYTHONMALLOC="debug",
+        DHKIT_KERNELS="on",
+        DHKIT_CACHE_DIR=str(tmp_path),
+    )
+    assert (done.returncode, done.stderr) == (0, "")
