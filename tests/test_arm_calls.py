@@ -1,6 +1,7 @@
 """Single calls of an arm's methods: compiled functions that give the ordinary way's values and exceptions."""
 
 import copy
+import dataclasses
 import gc
 import os
 import pickle
@@ -380,3 +381,96 @@ def test_the_debug_allocator_finds_no_bad_access(tmp_path):
         DHKIT_CACHE_DIR=str(tmp_path),
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+# Inverse kinematics
+
+FIELDS = ("q", "distance", "valid", "flags", "status_code")
+CLOSED_FORMS = ("puma560", "ur5", "stanford", "irb140", "cobra600", "planar2r")
+
+
+def poses(arm, rng, count):
+    """Yield poses inside and beyond the workspace, singular ones, and matrices that are not poses."""
+    for q in rng.uniform(-3, 3, (count, arm.n)):
+        T = arm.fk(q)
+        yield T
+        yield arm.fk(np.where(rng.random(arm.n) < 0.5, 0.0, q))
+        far = T.copy()
+        far[:3, 3] *= rng.choice([1.5, 10.0, 1e200])
+        yield far
+        for change in (np.nan, np.inf, 1e-9, 1e-5, 1.0):
+            wrong = T.copy()
+            wrong[rng.integers(4), rng.integers(4)] += change
+            yield wrong
+
+
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_the_solutions_of_one_pose_are_those_of_the_ordinary_way(name, law):
+    arm = compiled(Arm.load(name))
+    rng = np.random.default_rng(7)
+    taken = 0
+    for T in poses(arm, rng, law.samples(2000, quick=20)):
+        expected = kinematics.inverse_kinematics(arm, T)
+        found = arm.ik(T)
+        taken += "_packed" in vars(found)
+        if np.array_equal(found.flags, expected.flags):
+            for field in FIELDS:
+                one = getattr(found, field)
+                other = getattr(expected, field)
+                assert (one.shape, one.dtype) == (other.shape, other.dtype)
+                assert one.flags.writeable
+                largest = np.nan_to_num(np.abs(other.astype(float)), posinf=1.0).max(initial=1.0)
+                assert np.allclose(one, other, rtol=0, atol=1e-7 * largest, equal_nan=True), field
+            assert repr(found) == repr(expected)
+        else:
+            # At a boundary of singularity or limits, sines that differ in the last bit decide otherwise.
+            law.holds("decided otherwise", np.abs(found.flags - 1.0 * expected.flags).max(), 31)
+        assert found.branches == expected.branches and found.complete
+    assert taken > 20
+
+
+def test_solutions_of_one_pose_are_copied_pickled_and_replaced(puma):
+    T = puma.fk(np.linspace(-1, 1, 6))
+    expected = puma.ik(T).valid
+    assert np.array_equal(pickle.loads(pickle.dumps(puma.ik(T))).valid, expected)
+    assert np.array_equal(copy.deepcopy(puma.ik(T)).valid, expected)
+    replaced = dataclasses.replace(puma.ik(T), q=np.zeros((8, 6)))
+    assert np.array_equal(replaced.valid, expected) and not replaced.q.any()
+    with pytest.raises(AttributeError, match="'IKSolutions' object has no attribute 'validity'"):
+        _ = puma.ik(T).validity
+
+
+def test_unusual_poses_give_the_same_values_and_exceptions(puma, tmp_path):
+    T = puma.fk(np.linspace(-1, 1, 6))
+    flat = np.zeros(33)[1:]
+    flat[::2] = T.ravel()
+    for value in (
+        T.tolist(),
+        T.astype(np.float32),
+        T.astype(">f8"),
+        np.asfortranarray(T),
+        flat[::2].reshape(4, 4),
+        T.view(Subclass),
+        T[None],
+        np.array([T, T]),
+        T[:3],
+        T.ravel(),
+        np.eye(3),
+        None,
+        "ready",
+        np.ma.masked_array(T),
+    ):
+        found = outcome(puma.ik, value)
+        expected = outcome(kinematics.inverse_kinematics, puma, value)
+        if isinstance(expected, tuple):
+            assert found == expected
+        else:
+            assert np.allclose(found.q, expected.q, rtol=0, atol=1e-9, equal_nan=True)
+            assert np.array_equal(found.valid, expected.valid)
+    for out in (np.empty((8, 6)), np.empty((6, 8)), np.empty((8, 6), order="F"), [], T):
+        found = outcome(puma.ik, T.copy(), out=out)
+        expected = outcome(kinematics.inverse_kinematics, puma, T.copy(), out=out)
+        if isinstance(expected, tuple):
+            assert found == expected
+        else:
+            assert found.q is out

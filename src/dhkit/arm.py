@@ -778,6 +778,8 @@ class Arm:
         >>> bool(np.allclose(arm.fk(solutions.q), T))
         True
         """
+        if seed is None and threads == 1 and (found := self._calls.ik(T, out)) is not None:
+            return found
         from dhkit.kinematics import inverse_kinematics
 
         return inverse_kinematics(self._description, T, seed, out, threads)

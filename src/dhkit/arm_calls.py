@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from dhkit.description import Array, Description
 from dhkit.dynamics.programs import dynamics_kernel
 from dhkit.errors import DescriptionError
-from dhkit.kernels import Kernel
-from dhkit.kernels.single_calls import FastCall, SingleCall, never
+from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
+from dhkit.kinematics.pose_call import PoseCall, pose_call
+from dhkit.kinematics.solutions import IKSolutions
+
+ArrayCall: TypeAlias = Callable[..., Array | None]
+PoseCallLike: TypeAlias = Callable[..., IKSolutions | None]
 
 
 class _Quantity(NamedTuple):
@@ -50,25 +54,30 @@ class ArmCalls:
     Each takes the states, and ``out`` or None, all by position, and returns None for whatever it does not take.
     """
 
-    fk: FastCall
-    frames: FastCall
-    jacobian: FastCall
-    jacobian_dot: FastCall
-    mass_matrix: FastCall
-    coriolis_matrix: FastCall
-    gravity_torque: FastCall
-    bias: FastCall
-    inverse_dynamics: FastCall
-    forward_dynamics: FastCall
+    fk: ArrayCall
+    frames: ArrayCall
+    jacobian: ArrayCall
+    jacobian_dot: ArrayCall
+    mass_matrix: ArrayCall
+    coriolis_matrix: ArrayCall
+    gravity_torque: ArrayCall
+    bias: ArrayCall
+    inverse_dynamics: ArrayCall
+    forward_dynamics: ArrayCall
+    ik: PoseCallLike
 
     def __init__(self, description: Description) -> None:
         self._description = description
 
     def __getattr__(self, name: str) -> FastCall:
         """Return the function of a quantity that is asked for the first time."""
-        if name not in _QUANTITIES:
+        call: FastCall | None
+        if name == "ik":
+            call = pose_call(self._description)
+        elif name in _QUANTITIES:
+            call = self._single_call(name)
+        else:
             raise AttributeError(name)
-        call = self._single_call(name)
         setattr(self, name, never if call is None else call)
         function: FastCall = self.__dict__[name]
         return function
@@ -80,10 +89,13 @@ class ArmCalls:
             if call is not None:
                 call.compile()
             yield name
+        if isinstance(self.ik, PoseCall):
+            self.ik.compile()
+        yield "ik"
 
     def count(self) -> int:
         """Return the number of quantities."""
-        return len(_QUANTITIES)
+        return len(_QUANTITIES) + 1
 
     def _single_call(self, name: str) -> SingleCall | None:
         """Return a quantity that is not compiled yet; None of dynamics without bodies, whose ordinary way says so."""

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import prod
 
-from dhkit.kernels.llvm_source import FLOAT, result_values
-from dhkit.kernels.vectors import FUSING, Body, Vector
+from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER, result_values
+from dhkit.kernels.vectors import EXACT, FUSING, Body, Vector
 from dhkit.symbolic import Graph
 
 MAX_ITEMS = 64
@@ -20,17 +20,18 @@ MAX_ITEMS = 64
 CONTEXT = (
     "array_type",
     "float_type",
-    "new_array",
-    "add_reference",
-    "drop_reference",
     "none",
     "parameters",
+    "PyArray_New",
+    "PyBytes_FromStringAndSize",
+    "PyTuple_Pack",
+    "Py_IncRef",
+    "Py_DecRef",
 )
 """Addresses that the function reads from its context, the array that Python binds to it, in this order.
 
-The class ``numpy.ndarray``, the object of the type float64, the functions ``PyArray_New``, ``Py_IncRef`` and
-``Py_DecRef``, the object ``None``, and the arm's parameters. They differ between processes, so that machine code, which
-is kept on disk, contains none of them.
+The class ``numpy.ndarray``, the object of the type float64, ``None``, the arm's parameters, and functions of NumPy and
+Python. They differ between processes, so that machine code, which is kept on disk, contains none of them.
 """
 
 # Byte offsets in NumPy's PyArrayObject_fields on 64-bit machines: ob_refcnt and ob_type of the object's header first.
@@ -40,6 +41,8 @@ AXES_OFFSET = 24
 SHAPE_OFFSET = 32
 DTYPE_OFFSET = 56
 FLAGS_OFFSET = 64
+_BYTES_OFFSET = 32
+"""Where the content of a ``bytes`` object begins."""
 
 _C_CONTIGUOUS = 0x0001
 _ALIGNED = 0x0100
@@ -98,30 +101,66 @@ class _Function:
         self.load(f"{name}_axes", "i32", pointer, AXES_OFFSET)
         self.load(f"{name}_shape", "ptr", pointer, SHAPE_OFFSET)
 
+    def require_shape(self, name: str, shape: Sequence[int]) -> None:
+        """Check the shape of an array: (*shape) of a single item, (%items, *shape) of a batch."""
+        self.add(
+            f"%{name}_wanted_axes = add i32 %batch_axes, {len(shape)}",
+            f"%{name}_has_axes = icmp eq i32 %{name}_axes, %{name}_wanted_axes",
+        )
+        self.require(f"%{name}_has_axes")
+        self.add(
+            f"%{name}_first = load i64, ptr %{name}_shape",
+            f"%{name}_items = select i1 %is_single, i64 1, i64 %{name}_first",
+            f"%{name}_has_items = icmp eq i64 %{name}_items, %items",
+        )
+        self.require(f"%{name}_has_items")
+        self.add(f"%{name}_sizes = getelementptr i64, ptr %{name}_shape, i64 %batch_axes_wide")
+        for k, size in enumerate(shape):
+            self.add(
+                f"%{name}_size{k}_at = getelementptr i64, ptr %{name}_sizes, i64 {k}",
+                f"%{name}_size{k} = load i64, ptr %{name}_size{k}_at",
+                f"%{name}_has_size{k} = icmp eq i64 %{name}_size{k}, {size}",
+            )
+            self.require(f"%{name}_has_size{k}")
 
-def call_source(graph: Graph, tail: Sequence[int], *, refuses_nan: bool) -> str:
+
+def state_shapes(graph: Graph) -> list[tuple[int, ...]]:
+    """Return the shapes of a program's inputs after the parameters; CasADi's columns are vectors."""
+    shapes = [variable.shape for variable in graph.inputs[1:]]
+    return [shape[:1] if shape[1:] == (1,) else shape for shape in shapes]
+
+
+def call_source(
+    graph: Graph, types: Sequence[str], tail: Sequence[int], *, refuses_nan: bool
+) -> str:
     """Return a module with ``PyObject *call(PyObject *context, PyObject *const *arguments, Py_ssize_t count)``.
 
     The arguments are one array for each input after the parameters, and ``out`` or None. Taken are arrays of float64,
-    C-contiguous, of shape (size,), or (N, size) with N from 1 to ``MAX_ITEMS``, all alike, and an ``out`` of the
-    result's shape. The result is ``out`` or a new array; None of arguments that are not taken, which stay unchanged.
-    Results are NaN by the rule of :func:`dhkit.kernels.llvm_source.llvm_source`.
+    C-contiguous, of the inputs' shapes, or all with a batch axis of 1 to ``MAX_ITEMS`` items before it, and an ``out``
+    of the result's shape. The result is ``out`` or a new array; None of arguments that are not taken, which stay
+    unchanged. Results are NaN by the rule of :func:`dhkit.kernels.llvm_source.llvm_source`.
+
+    Of a program with several outputs, the first one is that array, and the others are the content of a ``bytes`` object
+    one after the other; the result is the pair of both, and a batch is not taken.
 
     Parameters
     ----------
     graph
-        A program with one output; its first input holds the parameters.
+        A program; its first input holds the parameters.
+    types
+        Types of its outputs, see :func:`dhkit.kernels.llvm_source.llvm_source`; the first is float64.
     tail
         Axes of the result after those of the batch.
     refuses_nan
         Whether a result with an entry that is not finite counts as arguments that are not taken.
     """
-    return "\n".join([*_program(graph, refuses_nan), *_call(graph, tail), ""])
+    return "\n".join([*_program(graph, types, refuses_nan), *_call(graph, types, tail), ""])
 
 
-def _program(graph: Graph, refuses_nan: bool) -> list[str]:
+def _program(graph: Graph, types: Sequence[str], refuses_nan: bool) -> list[str]:
     """Return the lines of ``run``, which computes one item; of a refused NaN it writes nothing and returns false."""
-    body = Body(FUSING, width=1)
+    # As in the vector kernel: programs that decide small integers round every operation.
+    body = Body(EXACT if SMALL_INTEGER in types else FUSING, width=1)
 
     def loaded(pointer: str, size: int) -> list[Vector]:
         values = []
@@ -135,7 +174,7 @@ def _program(graph: Graph, refuses_nan: bool) -> list[str]:
         loaded(pointer, variable.size)
         for pointer, variable in zip(pointers, graph.inputs, strict=True)
     ]
-    (results,) = result_values(graph, body, inputs, [FLOAT])
+    results, *packed = result_values(graph, body, inputs, types)
     stores = ["  br label %store"]
     if refuses_nan:
         # x - x is 0, and NaN where x is not finite.
@@ -149,7 +188,8 @@ def _program(graph: Graph, refuses_nan: bool) -> list[str]:
             f"  %y{k} = getelementptr double, ptr %y, i64 {k}",
             f"  store double {result.name}, ptr %y{k}",
         ]
-    signature = ", ".join(f"ptr {pointer}" for pointer in (*pointers, "%y"))
+    stores += _packed_stores(packed, types[1:])
+    signature = ", ".join(f"ptr {pointer}" for pointer in (*pointers, "%y", "%packed"))
     return [
         *body.declarations(),
         *Body().declarations(),
@@ -163,133 +203,163 @@ def _program(graph: Graph, refuses_nan: bool) -> list[str]:
     ]
 
 
-def _call(graph: Graph, tail: Sequence[int]) -> list[str]:
+def _packed_stores(outputs: Sequence[Sequence[Vector]], types: Sequence[str]) -> list[str]:
+    """Return the lines that write the entries of further outputs one after the other."""
+    lines = []
+    offset = 0
+    for kind, entries in zip(types, outputs, strict=True):
+        for entry in entries:
+            place = f"%packed{offset}"
+            lines.append(f"  {place} = getelementptr i8, ptr %packed, i64 {offset}")
+            if kind == FLOAT:
+                lines.append(f"  store double {entry.name}, ptr {place}, align 1")
+            else:
+                lines += [
+                    f"  {place}_wide = fptosi double {entry.name} to i32",
+                    f"  {place}_small = trunc i32 {place}_wide to i8",
+                    f"  store i8 {place}_small, ptr {place}",
+                ]
+            offset += _BYTES[kind]
+    return lines
+
+
+_BYTES = {FLOAT: 8, SMALL_INTEGER: 1}
+"""Sizes of an entry in bytes, by type."""
+
+
+def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
     """Return the lines of ``call``."""
-    sizes = [variable.size for variable in graph.inputs[1:]]
+    shapes = state_shapes(graph)
+    is_packing = len(types) > 1
     function = _Function()
-    function.add(f"%has_count = icmp eq i64 %count, {len(sizes) + 1}")
+    function.add(f"%has_count = icmp eq i64 %count, {len(shapes) + 1}")
     function.require("%has_count")
     function.load("context_data", "ptr", "%context", DATA_OFFSET)
     for k, name in enumerate(CONTEXT):
         function.load(name, "ptr", "%context_data", 8 * k)
 
-    # Inputs: (size,) or (N, size), with the same batch axis.
-    for k, size in enumerate(sizes):
-        function.load(f"x{k}", "ptr", "%arguments", 8 * k)
-        function.require_array(f"x{k}", f"%x{k}")
-        if k == 0:
-            function.add(
-                "%is_single = icmp eq i32 %x0_axes, 1",
-                "%is_batch = icmp eq i32 %x0_axes, 2",
-                "%has_axes = or i1 %is_single, %is_batch",
-            )
-        else:
-            function.add(f"%x{k}_has_axes = icmp eq i32 %x{k}_axes, %x0_axes")
-        function.require("%has_axes" if k == 0 else f"%x{k}_has_axes")
-        function.add(
-            f"%x{k}_last = select i1 %is_single, i64 0, i64 1",
-            f"%x{k}_size_at = getelementptr i64, ptr %x{k}_shape, i64 %x{k}_last",
-            f"%x{k}_size = load i64, ptr %x{k}_size_at",
-            f"%x{k}_has_size = icmp eq i64 %x{k}_size, {size}",
-            f"%x{k}_first = load i64, ptr %x{k}_shape",
-            f"%x{k}_items = select i1 %is_single, i64 1, i64 %x{k}_first",
-        )
-        function.require(f"%x{k}_has_size")
-        if k == 0:
-            # One comparison without sign for 1 <= N <= MAX_ITEMS.
-            function.add(
-                "%x0_items_less_1 = sub i64 %x0_items, 1",
-                f"%x0_has_items = icmp ult i64 %x0_items_less_1, {MAX_ITEMS}",
-            )
-        else:
-            function.add(f"%x{k}_has_items = icmp eq i64 %x{k}_items, %x0_items")
-        function.require(f"%x{k}_has_items")
+    # Whether the first input is a single item or a batch decides about all.
+    function.load("x0", "ptr", "%arguments", 0)
+    function.require_array("x0", "%x0")
+    function.add(
+        f"%is_single = icmp eq i32 %x0_axes, {len(shapes[0])}",
+        "%batch_axes = select i1 %is_single, i32 0, i32 1",
+        "%batch_axes_wide = zext i32 %batch_axes to i64",
+        "%x0_has_first_axis = icmp sgt i32 %x0_axes, 0",
+    )
+    function.require("%is_single" if is_packing else "%x0_has_first_axis")
+    function.add(
+        "%x0_first_size = load i64, ptr %x0_shape",
+        "%items = select i1 %is_single, i64 1, i64 %x0_first_size",
+        # One comparison without sign for 1 <= items <= MAX_ITEMS.
+        "%items_less_1 = sub i64 %items, 1",
+        f"%has_few_items = icmp ult i64 %items_less_1, {MAX_ITEMS}",
+    )
+    function.require("%has_few_items")
+    for k, shape in enumerate(shapes):
+        if k:
+            function.load(f"x{k}", "ptr", "%arguments", 8 * k)
+            function.require_array(f"x{k}", f"%x{k}")
+        function.require_shape(f"x{k}", shape)
 
-    # The result: out, or a new array of shape (*tail) or (N, *tail).
-    function.load("out", "ptr", "%arguments", 8 * len(sizes))
+    # The result: out, or a new array of shape (*tail) or (items, *tail).
+    function.load("out", "ptr", "%arguments", 8 * len(shapes))
     function.add(
         "%is_new = icmp eq ptr %out, %none", "br i1 %is_new, label %allocate, label %check_out"
     )
     function.label("check_out")
     function.require_array("out", "%out", writeable=True)
-    function.add(
-        f"%out_item_axes = add i32 %x0_axes, {len(tail) - 1}",
-        "%out_has_axes = icmp eq i32 %out_axes, %out_item_axes",
-    )
-    function.require("%out_has_axes")
-    function.add("%out_start = select i1 %is_single, i64 0, i64 1")
-    for k, size in enumerate(tail):
-        function.add(
-            f"%out_axis{k} = add i64 %out_start, {k}",
-            f"%out_size{k}_at = getelementptr i64, ptr %out_shape, i64 %out_axis{k}",
-            f"%out_size{k} = load i64, ptr %out_size{k}_at",
-            f"%out_has_size{k} = icmp eq i64 %out_size{k}, {size}",
-        )
-        function.require(f"%out_has_size{k}")
-    function.add(
-        "%out_first = load i64, ptr %out_shape",
-        "%out_items = select i1 %is_single, i64 1, i64 %out_first",
-        "%out_has_items = icmp eq i64 %out_items, %x0_items",
-    )
-    function.require("%out_has_items")
+    function.require_shape("out", tail)
     function.add("br i1 %is_single, label %use_out, label %check_overlap")
 
     # One item is read before it is written. Of a batch, memory that out shares with an input would be read too late.
     function.label("check_overlap")
-    _require_no_overlap(function, sizes, prod(tail))
+    _require_no_overlap(function, [prod(shape) for shape in shapes], prod(tail))
     function.add("br label %use_out")
     function.label("use_out")
-    function.add("call void %add_reference(ptr %out)", "br label %compute")
+    function.add("call void %Py_IncRef(ptr %out)", "br label %compute")
 
     function.label("allocate")
     function.add(
         f"%shape = alloca i64, i64 {len(tail) + 1}",
-        "store i64 %x0_items, ptr %shape",
+        "store i64 %items, ptr %shape",
         *_stored_sizes(tail),
-        f"%new_axes = select i1 %is_single, i32 {len(tail)}, i32 {len(tail) + 1}",
-        "%new_start = select i1 %is_single, i64 1, i64 0",
+        f"%new_axes = add i32 %batch_axes, {len(tail)}",
+        "%new_start = sub i64 1, %batch_axes_wide",
         "%new_shape = getelementptr i64, ptr %shape, i64 %new_start",
-        f"%new = call ptr %new_array(ptr %array_type, i32 %new_axes, ptr %new_shape, i32 {_FLOAT64},"
+        f"%new = call ptr %PyArray_New(ptr %array_type, i32 %new_axes, ptr %new_shape, i32 {_FLOAT64},"
         " ptr null, ptr null, i32 0, i32 0, ptr null)",
         "%is_out_of_memory = icmp eq ptr %new, null",
         "br i1 %is_out_of_memory, label %failed, label %compute",
     )
 
     function.label("compute")
-    function.add("%result = phi ptr [%out, %use_out], [%new, %allocate]")
-    function.load("y", "ptr", "%result", DATA_OFFSET)
+    function.add("%array = phi ptr [%out, %use_out], [%new, %allocate]")
+    function.load("y", "ptr", "%array", DATA_OFFSET)
+    if is_packing:
+        variables = zip(types[1:], graph.outputs[1:], strict=True)
+        size = sum(_BYTES[kind] * variable.size for kind, variable in variables)
+        function.add(
+            f"%bytes = call ptr %PyBytes_FromStringAndSize(ptr null, i64 {size})",
+            "%has_no_bytes = icmp eq ptr %bytes, null",
+            "br i1 %has_no_bytes, label %failed_after_array, label %with_bytes",
+        )
+        function.label("failed_after_array")
+        function.add("call void %Py_DecRef(ptr %array)", "br label %failed")
+        function.label("with_bytes")
+        function.add(
+            f"%packed = getelementptr i8, ptr %bytes, i64 {_BYTES_OFFSET}", "br label %first_item"
+        )
+    else:
+        function.add("br label %first_item")
+    function.label("first_item")
     function.add("br label %item")
     function.label("item")
-    function.add("%k = phi i64 [0, %compute], [%next, %computed]")
-    for name, size in (*((f"x{k}", size) for k, size in enumerate(sizes)), ("y", prod(tail))):
+    function.add("%k = phi i64 [0, %first_item], [%next, %computed]")
+    for name, size in (
+        *((f"x{k}", prod(shape)) for k, shape in enumerate(shapes)),
+        ("y", prod(tail)),
+    ):
         pointer = "%y" if name == "y" else f"%{name}_data"
         function.add(
             f"%{name}_offset = mul i64 %k, {size}",
             f"%{name}_item = getelementptr double, ptr {pointer}, i64 %{name}_offset",
         )
-    items = ", ".join(f"ptr %x{k}_item" for k in range(len(sizes)))
+    items = ", ".join(f"ptr %x{k}_item" for k in range(len(shapes)))
+    packed = "%packed" if is_packing else "null"
     function.add(
-        f"%is_done = call i1 @run(ptr %parameters, {items}, ptr %y_item)",
+        f"%is_done = call i1 @run(ptr %parameters, {items}, ptr %y_item, ptr {packed})",
         "br i1 %is_done, label %computed, label %refused",
     )
     function.label("computed")
     function.add(
         "%next = add i64 %k, 1",
-        "%has_more = icmp slt i64 %next, %x0_items",
+        "%has_more = icmp slt i64 %next, %items",
         "br i1 %has_more, label %item, label %finished",
     )
     function.label("finished")
-    function.add("ret ptr %result")
+    if is_packing:
+        function.add(
+            "%pair = call ptr (i64, ...) %PyTuple_Pack(i64 2, ptr %array, ptr %bytes)",
+            "call void %Py_DecRef(ptr %array)",
+            "call void %Py_DecRef(ptr %bytes)",
+            "ret ptr %pair",
+        )
+    else:
+        function.add("ret ptr %array")
     function.label("failed")
     function.add("ret ptr null")
     function.label("refused")
-    function.add("call void %drop_reference(ptr %result)", "br label %other")
+    function.add("call void %Py_DecRef(ptr %array)")
+    if is_packing:
+        function.add("call void %Py_DecRef(ptr %bytes)")
+    function.add("br label %other")
     function.label("other")
     # Checks before the context was read end here too.
     function.load("own_data", "ptr", "%context", DATA_OFFSET)
-    for name in ("none", "add_reference"):
-        function.load(f"own_{name}", "ptr", "%own_data", 8 * CONTEXT.index(name))
-    function.add("call void %own_add_reference(ptr %own_none)", "ret ptr %own_none")
+    function.load("own_none", "ptr", "%own_data", 8 * CONTEXT.index("none"))
+    function.load("own_incref", "ptr", "%own_data", 8 * CONTEXT.index("Py_IncRef"))
+    function.add("call void %own_incref(ptr %own_none)", "ret ptr %own_none")
     return [
         "define ptr @call(ptr %context, ptr %arguments, i64 %count) {",
         "entry:",
@@ -311,12 +381,12 @@ def _stored_sizes(tail: Sequence[int]) -> list[str]:
 def _require_no_overlap(function: _Function, sizes: Sequence[int], result_size: int) -> None:
     """Check that a batch's ``out`` and its inputs lie in different memory: one ends before the other begins."""
     function.add(
-        f"%out_count = mul i64 %x0_items, {result_size}",
+        f"%out_count = mul i64 %items, {result_size}",
         "%out_end = getelementptr double, ptr %out_data, i64 %out_count",
     )
     for k, size in enumerate(sizes):
         function.add(
-            f"%x{k}_count = mul i64 %x0_items, {size}",
+            f"%x{k}_count = mul i64 %items, {size}",
             f"%x{k}_end = getelementptr double, ptr %x{k}_data, i64 %x{k}_count",
             f"%x{k}_is_before = icmp ule ptr %x{k}_end, %out_data",
             f"%x{k}_is_after = icmp ule ptr %out_end, %x{k}_data",

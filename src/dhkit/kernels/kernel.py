@@ -76,7 +76,7 @@ class Kernel:
         self.name = name
         self._pattern = pattern
         self._derive = derive
-        self._types = types
+        self.types = tuple(types)
         self._graph: Graph | None = None
         self._interpreter: Interpreter | None = None
         self._function: CompiledFunction | None = None
@@ -151,14 +151,10 @@ class Kernel:
         code = store.read(name, key)
         if code is None:
             log.info("compiling %s", name)
-            source = call_source(self._program(), tail, refuses_nan=refuses_nan)
+            source = call_source(self.program(), self.types, tail, refuses_nan=refuses_nan)
             code = machine_code.compile_module(source)
             store.write(name, key, code)
         return machine_code.CompiledCall(code)
-
-    def state_sizes(self) -> list[int]:
-        """Return the number of entries of each input after the parameters."""
-        return [variable.size for variable in self._program().inputs[1:]]
 
     def __repr__(self) -> str:
         return repr_line(
@@ -199,13 +195,13 @@ class Kernel:
         self._looked_up = True
 
     def _compile(self) -> None:
-        program = self._program()
+        program = self.program()
         log.info("compiling %s", self.name)
         try:
             from dhkit.kernels import machine_code, store
             from dhkit.kernels.llvm_source import llvm_source
 
-            code = machine_code.compile_module(llvm_source(program, self._types))
+            code = machine_code.compile_module(llvm_source(program, self.types))
             self._function = machine_code.CompiledFunction(code)
         except _MACHINE_CODE_ERRORS as error:
             self._give_up(error)
@@ -218,15 +214,21 @@ class Kernel:
         log.warning("%s is interpreted: it cannot be compiled here (%s)", self.name, error)
 
     def _interpreted(self) -> Interpreter:
-        program = self._program()
+        program = self.program()
         with _deriving:
             if self._interpreter is None:
                 from dhkit.kernels.interpreter import Interpreter
 
-                self._interpreter = Interpreter(program, self._types)
+                self._interpreter = Interpreter(program, self.types)
             return self._interpreter
 
-    def _program(self) -> Graph:
+    @property
+    def mode(self) -> str:
+        """Whether kernels are compiled: see :func:`kernel_mode`."""
+        return kernel_mode()
+
+    def program(self) -> Graph:
+        """Return the program, derived at the first call."""
         with _deriving:
             if self._graph is None:
                 self._graph = self._derive()
@@ -249,6 +251,16 @@ class _Uncounted(threading.local):
 
 
 _uncounted = _Uncounted()
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Hold the lock under which kernels are compiled: no process is forked meanwhile.
+
+    Imports belong inside as well: a module that another thread is importing stays locked for ever in a forked child.
+    """
+    with _compiling:
+        yield
 
 
 @contextmanager

@@ -13,23 +13,30 @@ import logging
 import sys
 import sysconfig
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, TypeAlias
+from math import prod
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels.call_source import (
     AXES_OFFSET,
+    CONTEXT,
     DATA_OFFSET,
     DTYPE_OFFSET,
     FLAGS_OFFSET,
     SHAPE_OFFSET,
     TYPE_OFFSET,
+    state_shapes,
 )
-from dhkit.kernels.kernel import Kernel, kernel_mode
-from dhkit.kernels.machine_code import CompiledCall
+from dhkit.kernels.kernel import Kernel, compiling
+from dhkit.symbolic import Graph
+
+if TYPE_CHECKING:
+    from dhkit.kernels.machine_code import CompiledCall
 
 log = logging.getLogger(__name__)
 
@@ -46,8 +53,12 @@ _NEW_ARRAY = 93
 _AGREEMENT = 1e-9
 """Largest difference from the ordinary way at which a new function is used, relative to the largest entry."""
 
-FastCall: TypeAlias = Callable[..., Array | None]
-"""Takes the states and ``out`` or None; returns the result, or None of arguments that it does not take."""
+FastCall: TypeAlias = Callable[..., Any]
+"""Takes the states and ``out`` or None; returns the result, or None of arguments that it does not take.
+
+The result is an array, or for a program with several outputs the pair of the first one and of ``bytes``, see
+:func:`unpacked`.
+"""
 
 
 def never(*_: object) -> None:
@@ -67,6 +78,8 @@ class SingleCall:
         Called with the compiled function, or with :func:`never` if it cannot be made here.
     refuses_nan
         Whether a result that is not finite goes the ordinary way, which says why.
+    example
+        States at which a new function is compared with the kernel; arbitrary ones unless given.
     """
 
     def __init__(
@@ -76,18 +89,20 @@ class SingleCall:
         tail: tuple[int, ...],
         install: Callable[[FastCall], None],
         refuses_nan: bool = False,
+        example: Sequence[Array] | None = None,
     ) -> None:
         self._kernel = kernel
         self._parameters = parameters
         self._tail = tail
         self._install = install
         self._refuses_nan = refuses_nan
+        self._example = example
         self._calls = 0
         self._thread: threading.Thread | None = None
 
-    def __call__(self, *arguments: object) -> Array | None:
+    def __call__(self, *arguments: object) -> Any:
         """Count a call; return None, or the result where ``DHKIT_KERNELS`` is ``on``."""
-        mode = kernel_mode()
+        mode = self._kernel.mode
         if mode == "on":
             return self.compile()(*arguments)
         if mode == "off":
@@ -100,7 +115,8 @@ class SingleCall:
 
     def compile(self) -> FastCall:
         """Make the function now and install it; :func:`never` if it cannot be made here."""
-        function = self._compiled()
+        with compiling():
+            function = self._compiled()
         self._install(function)
         return function
 
@@ -118,7 +134,7 @@ class SingleCall:
             self._thread = None
 
     def _compiled(self) -> FastCall:
-        if kernel_mode() == "off" or not is_supported():
+        if self._kernel.mode == "off" or not is_supported():
             return never
         code = self._kernel.compiled_call(self._tail, self._refuses_nan)
         if code is None:
@@ -133,18 +149,61 @@ class SingleCall:
         return function
 
     def _agrees(self, function: FastCall) -> bool:
-        """Whether a function gives the kernel's result at a random state, and takes no list."""
-        rng = np.random.default_rng(0)
-        states = [rng.uniform(-1.0, 1.0, size) for size in self._kernel.state_sizes()]
-        expected = np.empty(self._tail)
-        self._kernel(self._parameters, [state[None] for state in states], [expected.reshape(1, -1)])
-        result = function(*states, None)
+        """Whether a function gives the kernel's results at the example, and takes no list."""
+        graph = self._kernel.program()
+        states = self._example or _different_states(state_shapes(graph))
+        kinds = zip(graph.outputs, self._kernel.types, strict=True)
+        expected: list[NDArray[Any]] = [np.empty((1, output.size), kind) for output, kind in kinds]
+        rows = [state.reshape(1, -1) for state in states]
+        self._kernel(self._parameters, rows, expected)
+
         if function(*(state.tolist() for state in states), None) is not None:
             return False
-        if result is None:
-            return self._refuses_nan and not np.isfinite(expected).all()
-        scale = float(np.abs(expected).max(initial=1.0))
-        return np.allclose(result, expected, rtol=0.0, atol=_AGREEMENT * scale, equal_nan=True)
+        found = function(*states, None)
+        if found is None:
+            return self._refuses_nan and not np.isfinite(expected[0]).all()
+        if len(expected) == 1:
+            return _are_near([found], expected)
+        array, packed = found
+        return _are_near([array, *unpacked(packed, graph, self._kernel.types)], expected)
+
+
+def _different_states(shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+    """Return states whose entries differ, between -1 and 1."""
+    return [
+        np.sin(np.arange(1.0, prod(shape) + 1.0) * (k + 1.0)).reshape(shape)
+        for k, shape in enumerate(shapes)
+    ]
+
+
+def _are_near(found: Sequence[NDArray[Any]], expected: Sequence[NDArray[Any]]) -> bool:
+    """Whether outputs agree to ``_AGREEMENT`` of their largest entry, and are NaN in the same entries."""
+    for one, other in zip(found, expected, strict=True):
+        largest = np.abs(np.nan_to_num(other)).max(initial=1.0)
+        difference = np.abs(one.ravel() - other.ravel().astype(float))
+        same_missing = np.array_equal(np.isnan(one.ravel()), np.isnan(other.ravel()))
+        if not same_missing or np.nanmax(difference, initial=0.0) > _AGREEMENT * largest:
+            return False
+    return True
+
+
+def unpacked(packed: bytes, graph: Graph, types: Sequence[str]) -> list[NDArray[Any]]:
+    """Return the outputs of a program after the first one, shape (size,) each, as new arrays.
+
+    Parameters
+    ----------
+    packed
+        The second part of a function's result.
+    graph, types
+        The program, and the types of its outputs.
+    """
+    outputs: list[NDArray[Any]] = []
+    start = 0
+    for output, kind in zip(graph.outputs[1:], types[1:], strict=True):
+        entries = np.frombuffer(packed, kind, output.size, start)
+        outputs.append(entries.copy())
+        start += entries.nbytes
+    return outputs
 
 
 class _Context(np.ndarray[Any, Any]):
@@ -175,11 +234,10 @@ def _bound(code: CompiledCall, parameters: Array) -> FastCall:
         [
             id(np.ndarray),
             id(np.dtype(np.float64)),
-            _numpy_interface()[_NEW_ARRAY],
-            _python_function("Py_IncRef"),
-            _python_function("Py_DecRef"),
             id(None),
             numbers.ctypes.data,
+            _numpy_interface()[_NEW_ARRAY],
+            *map(_python_function, CONTEXT[5:]),
         ],
         dtype=np.uintp,
     ).view(_Context)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from itertools import islice, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,6 +83,38 @@ class IKSolutions:
     complete: bool = True
     """Whether a pose that is reached has no other solutions than these; False where they were found by ssik or by
     iteration, which may miss some."""
+
+    @classmethod
+    def of_one_pose(cls, q: Array, packed: bytes, shared: Mapping[str, object]) -> IKSolutions:
+        """Return the solutions of one pose, whose other arrays are made when one of them is first read.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (B, n), rad and m.
+        packed
+            ``distance`` as a double, then B bytes of ``valid``, B of ``flags``, and ``status_code``.
+        shared
+            The fields that are not arrays, by name.
+        """
+        # Making an object as usual, and four arrays, would take longer than inverse kinematics.
+        solutions = object.__new__(cls)
+        object.__setattr__(solutions, "__dict__", {**shared, "q": q, "_packed": packed})
+        return solutions
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a field of :meth:`of_one_pose` that is read for the first time."""
+        packed = self.__dict__.get("_packed")
+        if packed is None or name not in ("distance", "valid", "flags", "status_code"):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        B = len(self.branches)
+        self.__dict__.update(
+            distance=np.frombuffer(packed, float, 1).reshape(()).copy(),
+            valid=np.frombuffer(packed, np.bool_, B, 8).copy(),
+            flags=np.frombuffer(packed, np.uint8, B, 8 + B).copy(),
+            status_code=np.frombuffer(packed, np.uint8, 1, 8 + 2 * B).reshape(()).copy(),
+        )
+        return self.__dict__[name]
 
     @property
     def lower(self) -> Array:

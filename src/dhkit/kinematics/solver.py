@@ -98,8 +98,7 @@ def solve_in_closed_form(
         )
         # A single call has no time to look for others.
         is_one_in_reach = count == 1 and distance.item() == 0.0
-        if fit.wrist_distances is not None and fit.parameters["offset"] and not is_one_in_reach:
-            # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
+        if has_offset_wrist(fit) and not is_one_in_reach:
             beyond = np.flatnonzero(distance.reshape(count) > 0)
             if beyond.size:
                 distance.reshape(count)[beyond] = nearest_wrist_distance(
@@ -115,6 +114,17 @@ def solve_in_closed_form(
         met=fit.coordinates,
         description=description,
     )
+
+
+def has_offset_wrist(fit: Fit) -> bool:
+    """Whether a spherical wrist's plane has an offset: the kernel's distance, to the nearest point in it, is too large.
+
+    Parameters
+    ----------
+    fit
+        The arm as a member of its family.
+    """
+    return fit.wrist_distances is not None and bool(fit.parameters["offset"])
 
 
 def free_angles(

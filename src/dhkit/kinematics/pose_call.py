@@ -1,0 +1,83 @@
+"""Closed-form inverse kinematics of one pose by a compiled function; see :mod:`dhkit.kernels.single_calls`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Array, Description, world_to_tool
+from dhkit.kernels import FastCall, SingleCall
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.solutions import IKSolutions
+from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_of
+
+_NO_SEED = np.zeros(2)
+"""Angles of free joints without a seed, rad."""
+_REACHED = bytes(8)
+"""The distance 0.0 as it begins the packed outputs."""
+
+
+class PoseCall:
+    """All solutions of one pose T (4, 4) of an arm with a closed form, or None of what it does not take."""
+
+    def __init__(self, description: Description, solver: Solver) -> None:
+        self._shared = {
+            "branches": solver.fit.branches,
+            "met": solver.fit.coordinates,
+            "description": description,
+            "complete": True,
+        }
+        # The ordinary way corrects the kernel's distance of poses beyond reach.
+        self._needs_reach = has_offset_wrist(solver.fit)
+        middle = np.arange(1.0, description.n + 1.0) / description.n
+        self._call: FastCall = SingleCall(
+            solver.kernel,
+            solver.parameters,
+            (len(solver.fit.branches), description.n),
+            install=self._install,
+            example=[world_to_tool(description, middle), _NO_SEED],
+        )
+
+    def _install(self, call: FastCall) -> None:
+        self._call = call
+
+    def compile(self) -> None:
+        """Compile the function now."""
+        if isinstance(self._call, SingleCall):
+            self._call.compile()
+
+    def __call__(self, T: Any, out: Array | None) -> IKSolutions | None:
+        """Return the solutions, written into ``out`` unless it is None.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in the world, shape (4, 4), m.
+        out
+            Array for the joint values, shape (B, n), rad and m.
+        """
+        if self._needs_reach and out is not None:
+            # It may lie where T lies, which the ordinary way would still need.
+            return None
+        found = self._call(T, _NO_SEED, out)
+        if found is None:
+            return None
+        q, packed = found
+        if self._needs_reach and not packed.startswith(_REACHED):
+            return None
+        return IKSolutions.of_one_pose(q, packed, self._shared)
+
+
+def pose_call(description: Description) -> PoseCall | None:
+    """Return the function of an arm; None without a closed form that is its own.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    solver = solver_of(description)
+    if solver is None or classify(description).neighbour is not None:
+        return None
+    return PoseCall(description, solver)
