@@ -37,6 +37,24 @@ def test_the_table_is_printed_and_written_with_its_meshes(tmp_path, capsys):
     assert len(list((tmp_path / "out" / "meshes").rglob("*.stl"))) == 7
 
 
+@pytest.mark.parametrize("digits", [3, 5, 9])
+def test_rounded_angles_bring_a_line_about_as_designed(digits, tmp_path, capsys):
+    """Also where the table as designed has no fewer lengths."""
+    urdf = tmp_path / "arm.urdf"
+    write_urdf(Arm.load("puma560").description, urdf)
+    exact = run(capsys, "extract", str(urdf))[1]
+    assert "--as-designed" not in exact
+    text = urdf.read_text()
+    assert "1.5707963267948966" in text
+    urdf.write_text(text.replace("1.5707963267948966", str(round(1.5707963267948966, digits))))
+    _, out, _ = run(capsys, "extract", str(urdf))
+    (line,) = [line for line in out.split("\n\n")[-1].splitlines() if "--as-designed" in line]
+    assert "reads them as right angles" in line or "smaller table" in line
+    facts = json.loads(run(capsys, "extract", str(urdf), "--json")[1])
+    assert sum("--as-designed" in note for note in facts["notes"]) == 1
+    assert "--as-designed" not in run(capsys, "extract", str(urdf), "--as-designed")[1]
+
+
 def test_json_has_the_table_and_the_residual(capsys):
     code, out, _ = run(capsys, "extract", str(asset("urdf/panda.urdf")), "--modified", "--json")
     facts = json.loads(out)

@@ -138,6 +138,63 @@ def test_an_output_folder(dhkit, folder, tmp_path):
     ]
 
 
+def files_in(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.*"))
+
+
+def test_an_output_folder_holds_the_last_run_alone(dhkit, folder, tmp_path):
+    out = tmp_path / "out"
+    dhkit(folder, output=out)
+    (folder / "bob" / "answer.toml").unlink()
+    (folder / "bob").rmdir()
+    (out / "students" / "remarks.html").write_text("the teacher's own")
+    (out / "records" / "zoe.json").write_text(
+        (out / "records" / "ada.json").read_text().replace("ada", "zoe")
+    )
+    _, _, err = dhkit(folder, output=out)
+    assert files_in(out) == [
+        "class.html",
+        "marks.csv",
+        *(f"records/{name}.json" for name in ("ada", "cleo", "zoe")),
+        *(f"students/{name}.html" for name in ("ada", "cleo", "remarks")),
+    ]
+    removed, left = err.splitlines()
+    assert removed.endswith("removed the results of an earlier run: bob")
+    assert left.endswith("not results of this run, left: records/zoe.json, students/remarks.html")
+
+
+def test_files_of_others_are_never_removed(dhkit, folder, tmp_path):
+    """Without a table of marks, or with one of somebody else, no result is known to be an earlier run's."""
+    out = tmp_path / "out"
+    (out / "records").mkdir(parents=True)
+    (out / "records" / "bob.txt").write_text("")
+    (out / "records" / "dan.json").write_text("{}")
+    (out / "marks.csv").write_text("student,points\ndan,3\n")
+    dhkit(folder, output=out)
+    assert {"records/bob.txt", "records/dan.json"} <= set(files_in(out))
+
+
+def test_marking_again_into_the_same_folder(dhkit, folder, tmp_path, capsys):
+    out = tmp_path / "out"
+    dhkit(folder, output=out)
+    before = files_in(out)
+    assert grade.mark_again([out], Rubric(points=10), Delivery(output=out)) == 2
+    assert files_in(out) == before
+    assert capsys.readouterr().err == ""
+
+
+def test_two_files_of_one_student_are_two_rows_and_are_told(dhkit, folder, tmp_path):
+    (folder / "ada" / "second.toml").write_text("right")
+    out = tmp_path / "out"
+    _, printed, _ = dhkit(folder, output=out)
+    words = "ada has 2 sheets (answer.toml, second.toml): each is judged and has a row of its own"
+    assert words in " ".join(printed.split())
+    assert words in (out / "class.html").read_text("utf-8")
+    rows = list(csv.DictReader((out / "marks.csv").read_text("utf-8").splitlines()))
+    assert [row["points"] for row in rows if row["student"] == "ada"] == ["62.5", "100"]
+    assert {"ada.html", "ada-2.html"} <= {path.name for path in (out / "students").iterdir()}
+
+
 def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
     dhkit(folder, output=tmp_path / "out", feedback="verdict")
     kinder = Rubric(points=10, credit=Credit(mistakes={"gravity_sign": 1}, follow_on=1))
@@ -145,6 +202,17 @@ def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
     ada, bob, cleo = map(json.loads, capsys.readouterr().out.splitlines())
     assert (ada["points"], bob["points"], cleo["points"]) == (10, 10, 0)
     assert ada["verdict"] == "wrong"
+
+
+def test_marking_again_takes_the_rubric_of_a_task(dhkit, folder, tmp_path, capsys):
+    from dhkit.cli import main
+
+    dhkit(folder, output=tmp_path / "out")
+    task = tmp_path / "task.toml"
+    task.write_text('robot = "planar2r"\n[rubric]\npoints = 10\n')
+    with pytest.raises(SystemExit):
+        main(["grade", "--remark", str(tmp_path / "out"), "--task", str(task), "--json"])
+    assert {json.loads(line)["most"] for line in capsys.readouterr().out.splitlines()} == {10}
 
 
 def test_marking_again_needs_reports(tmp_path):

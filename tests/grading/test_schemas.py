@@ -15,8 +15,9 @@ from dhkit.description import library_robot, robots
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.grading import LIBRARY, Rubric, Verdict, grade, robot_of
 from dhkit.grading.answers.sheet import read_sheet, read_task
+from dhkit.grading.empty_sheet import template
 from dhkit.grading.marks import marks
-from dhkit.grading.schema import rubric_schema, sheet_schema, task_schema, template
+from dhkit.grading.schema import rubric_schema, sheet_schema, task_schema
 from grading import test_docs, test_rubric
 
 HERE = Path(__file__).parent

@@ -119,6 +119,22 @@ def test_the_documents_format_is_one(read):
     SCHEMA.validate(tomllib.loads(shown))
 
 
+def test_names_of_panels_are_those_that_the_page_shows(read):
+    """``answers`` is Answers; it was ``submit`` once, which is still read."""
+    source = (ROOT / "src/dhkit/viewer/static/lab/panels.js").read_text("utf-8")
+    shown = dict(re.findall(r'^ +\["(\w+)", "([^"]+)", \w+\]', source, re.MULTILINE))
+    shown |= dict(re.findall(r'\[\["(\w+)", "([^"]+)", \w+\]\]', source))
+    assert shown.pop("task") == "Task"  # shown with every assignment
+    assert set(shown) == set(PANELS)
+    others = {name: title for name, title in shown.items() if title.lower() != name}
+    assert others == {"table": "DH table", "own": "My code"}
+    page = (ROOT / "docs" / "lab.md").read_text("utf-8")
+    assert '"table" is DH table, "own" My code' in page
+    assert "submit" not in PANELS
+    earlier = GOOD.replace('"joints", "motion"', '"submit", "joints"')
+    assert read(earlier).panels == ("answers", "joints")
+
+
 def test_panels_are_those_of_the_page():
     assert {"joints", "tool", "table", "motion", "control", "own"} <= set(PANELS)
     assert "task" not in PANELS and "lab/task.js" in page_files()

@@ -300,7 +300,7 @@ def test_files_that_are_no_solids_are_refused_in_a_line(tmp_path, name, content,
 
 
 def judged(lab, kind, text):
-    lab.answer("submit.grade", {"kind": kind, "text": text})
+    lab.answer("answers.grade", {"kind": kind, "text": text})
     return wait(lab, "verdict", lambda verdict: verdict and not verdict["running"])
 
 
@@ -351,7 +351,7 @@ def test_programs_are_read_and_never_run(open_lab, tmp_path):
 )
 def test_an_answer_that_cannot_be_sent_is_refused_at_once(open_lab, kind, text, complaint):
     with pytest.raises(ValueError, match=complaint):
-        open_lab("planar2r").answer("submit.grade", {"kind": kind, "text": text})
+        open_lab("planar2r").answer("answers.grade", {"kind": kind, "text": text})
 
 
 @pytest.mark.slow
@@ -373,17 +373,17 @@ def test_an_answer_that_cannot_be_read_is_said_in_a_line(open_lab):
 def test_judging_is_ended_with_the_lab_and_when_it_is_cancelled():
     with Lab(Arm.load("puma560")) as lab:
         lab.answer(
-            "submit.grade",
+            "answers.grade",
             {
                 "kind": "lines",
                 "text": "M11 = " + " + ".join(f"c{k % 3 + 1}^{k}" for k in range(1, 60)),
             },
         )
         wait_for(judges)
-        lab.answer("submit.cancel", {})
+        lab.answer("answers.cancel", {})
         assert state(lab, "verdict") is None
         wait_for(lambda: not judges())
-        lab.answer("submit.grade", {"kind": "lines", "text": RIGHT})
+        lab.answer("answers.grade", {"kind": "lines", "text": RIGHT})
         wait_for(judges)
     wait_for(lambda: not judges())
 
@@ -415,12 +415,12 @@ def test_a_sheet_about_another_robot_is_refused_and_no_verdict_stays(open_lab):
     judged(lab, "lines", RIGHT)
     with pytest.raises(ValueError, match="the sheet is about 'puma560'; the arm here is planar2r"):
         lab.answer(
-            "submit.grade", {"kind": "sheet", "text": 'robot = "puma560"\n[answer]\nV = "0"\n'}
+            "answers.grade", {"kind": "sheet", "text": 'robot = "puma560"\n[answer]\nV = "0"\n'}
         )
     assert state(lab, "verdict") is None
     judged(lab, "lines", RIGHT)
     with pytest.raises(ValueError, match="empty"):
-        lab.answer("submit.grade", {"kind": "lines", "text": "  "})
+        lab.answer("answers.grade", {"kind": "lines", "text": "  "})
     assert state(lab, "verdict") is None
 
 

@@ -147,19 +147,19 @@ def test_a_box_is_turned_and_moved_step_by_step(open_page):
 
 def test_an_answer_is_judged_on_the_page(kept_page):
     _, page = kept_page("planar2r")
-    panel(page, "submit")
-    assert "m1, m2" in texts(page, "#panel-submit .hint")[0]
+    panel(page, "answers")
+    assert "m1, m2" in texts(page, "#panel-answers .hint")[0]
     page.evaluate(f"{labelled('Answer')}.value = 'M22 = m2*l2^2/3\\ng2 = m2*g*l2*c2/2'")
     page.click(button("Judge"))
-    page.until("document.querySelectorAll('#panel-submit article').length === 2")
-    assert texts(page, "#panel-submit h3") == ["M22: correct", "g2: wrong"]
-    assert page.evaluate("document.querySelectorAll('#panel-submit article math').length") == 3
-    assert "angle" in texts(page, "#panel-submit .diagnosis")[0]
+    page.until("document.querySelectorAll('#panel-answers article').length === 2")
+    assert texts(page, "#panel-answers h3") == ["M22: correct", "g2: wrong"]
+    assert page.evaluate("document.querySelectorAll('#panel-answers article math').length") == 3
+    assert "angle" in texts(page, "#panel-answers .diagnosis")[0]
     page.evaluate(f"{labelled('Answer')}.value = {json.dumps(f'V = {HOSTILE}')}")
     page.click(button("Judge"))
-    page.until("document.querySelectorAll('#panel-submit article').length === 1")
-    assert texts(page, "#panel-submit h3") == ["V: unreadable"]
-    assert texts(page, "#panel-submit .verdict") == ["0 of 1 right"]
+    page.until("document.querySelectorAll('#panel-answers article').length === 1")
+    assert texts(page, "#panel-answers h3") == ["V: unreadable"]
+    assert texts(page, "#panel-answers .verdict") == ["0 of 1 right"]
     assert page.evaluate("document.querySelectorAll('img').length") == 0
     assert page.evaluate("globalThis.hacked ?? null") is None
 
@@ -183,7 +183,7 @@ def test_every_panel_fits_and_names_its_controls(open_page, sizes):
     _, page = open_page("puma560", width=sizes[0][0], height=sizes[0][1])
     for size in sizes:
         page.resize(*size)
-        for name in ("dynamics", "workspace", "transforms", "submit"):
+        for name in ("dynamics", "workspace", "transforms", "answers"):
             where = f"{name} at {size}"
             page.evaluate(f"document.getElementById('tab-{name}').click()")
             page.settle()

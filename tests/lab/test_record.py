@@ -108,7 +108,7 @@ def test_work_is_recorded_taken_up_again_and_collected(task, tmp_path):
     with begin(task, folder) as lab:
         assert met(lab) == [True, True, True, True, False, False]
         assert states(lab)["task"]["student"] == "Ada Lovelace"
-        lab.answer("submit.grade", {"kind": "lines", "text": "g2 = m2*g*l2*cos(q1 + q2)/2"})
+        lab.answer("answers.grade", {"kind": "lines", "text": "g2 = m2*g*l2*cos(q1 + q2)/2"})
         wait_for(lambda: met(lab)[4])
         lab.answer("control.start", {"controller": "computed-torque", "reference": "sine"})
         wait_for(lambda: all(met(lab)))

@@ -12,6 +12,7 @@ from acceptance import slow_if
 from dhkit import Arm, robots
 from dhkit.control.gains import effective_inertia
 from dhkit.description import from_toml, pose_parts
+from dhkit.lab.answers_panel import AnswersPanel
 from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import is_singular, start_configuration
 from dhkit.lab.dynamics_panel import DynamicsPanel
@@ -21,7 +22,6 @@ from dhkit.lab.obstacle_panel import ObstaclePanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_panel import PythonPanel
 from dhkit.lab.requests import RequestHandler
-from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import TablePanel
 from dhkit.lab.task_panel import TaskPanel
 from dhkit.lab.tool_panel import ToolPanel
@@ -42,7 +42,7 @@ from waiting import wait_for
 
 PANELS = (
     *(JointPanel, ToolPanel, TablePanel, MotionPanel, OwnPanel, ControlPanel, DynamicsPanel),
-    *(WorkspacePanel, SubmitPanel, TransformsPanel, TaskPanel, PythonPanel, ObstaclePanel),
+    *(WorkspacePanel, AnswersPanel, TransformsPanel, TaskPanel, PythonPanel, ObstaclePanel),
 )
 ROBOTS = ["puma560", "planar2r", "cobra600", "stanford", "panda"]
 
@@ -636,7 +636,7 @@ def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joi
     shown = states(lab)["table"]
     assert (shown["joints"], shown["locked"], len(shown["rows"])) == (6, [0, 3, 4, 5], 2)
     M11 = sympy_object(lab.desk.arm.lagrangian.M[0, 0])
-    lab.answer("submit.grade", {"kind": "lines", "text": f"M11 = {M11}"})
+    lab.answer("answers.grade", {"kind": "lines", "text": f"M11 = {M11}"})
     wait_for(lambda: not states(lab)["verdict"]["running"])
     assert [entry["passes"] for entry in states(lab)["verdict"]["entries"]] == [True]
     with pytest.raises(ValueError, match="locked already"):

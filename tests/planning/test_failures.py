@@ -203,7 +203,7 @@ def test_a_duration_below_what_limits_allow():
 
 def test_nothing_that_limits_a_smooth_motion():
     refused(
-        "^nothing limits how fast jerk may be: give a duration, or limits$",
+        r"^nothing limits how fast jerk may be: give a duration, or limits such as arm = arm\.with_limits\(",
         lambda: Planner(bare(1), "jerk").solve([0.0], [1.0]),
     )
 
@@ -261,6 +261,30 @@ def test_a_joint_without_limits():
         r"^joint joint1 has neither a torque, an acceleration nor a jerk limit, so least time has no bound below; ",
         lambda: Planner(arm).solve([0], [1]),
     )
+
+
+@pytest.mark.parametrize("links", ["bare", "uniform"])
+@pytest.mark.parametrize("kind", ["least time", "quintic", "jerk"])
+def test_an_arm_without_limits_gets_an_example_that_works(kind, links):
+    """The message names with_limits; the calls in it, as they stand, make the motion possible."""
+    arm = dhkit.Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)])
+    if links == "uniform":
+        arm = arm.with_uniform_links()
+    move = {
+        "least time": lambda arm, **given: arm.plan([0, 0], [1, 1], **given),
+        "quintic": lambda arm, **given: arm.quintic([0, 0], [1, 1], **given),
+        "jerk": lambda arm, **given: arm.plan([0, 0], [1, 1], "jerk", **given),
+    }[kind]
+    with pytest.raises(PlanningError, match="with_limits") as caught:
+        move(arm)
+    message = str(caught.value)
+    (example,) = re.findall(r"arm = (arm\.with_limits\([^)]*\))", message)
+    limited = eval(example, {"arm": arm})
+    given = {}
+    if kind == "least time" and links == "bare":
+        (limits,) = re.findall(r"limits=(dhkit\.Limits\.of\([^)]*\))", message)
+        given["limits"] = eval(limits, {"arm": limited, "dhkit": dhkit})
+    assert move(limited, **given).duration > 0
 
 
 def test_an_arm_without_bodies():

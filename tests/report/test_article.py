@@ -13,10 +13,15 @@ import pytest
 import dhkit
 from dhkit import Arm
 from dhkit.cli import main
+from dhkit.description import library_robot
 from dhkit.errors import DescriptionError, MissingPackageError
+from dhkit.kinematics.closed_form import classify
 from dhkit.report import article, write_report
 from dhkit.report.article import MOST_PAGES
 from dhkit.report.document import Formulas, Heading, Paragraph, Prompt, Table
+from dhkit.report.document.pdf import Pdf
+from dhkit.report.sections.inverse import inverse_section
+from dhkit.report.words import Attachments
 from report.report_checks import check_html, check_latex, without_verbatim
 from symbolic.equations.latex_width import latex_width
 
@@ -172,6 +177,39 @@ def test_a_pdf_keeps_the_pages(tmp_path):
     report = Arm.load("planar2r").report(tmp_path)
     assert report.path.read_bytes().startswith(b"%PDF")
     assert 5 < report.pages <= MOST_PAGES
+
+
+def test_too_many_pages_are_told_in_one_line(tmp_path, monkeypatch, caplog):
+    """Where no appendix at all is short enough, the report is written, and a line says so."""
+    module = sys.modules[article.__module__]
+    tried = []
+
+    def long_pdf(document):
+        tried.append(document)
+        return Pdf(b"%PDF", MOST_PAGES + 1)
+
+    monkeypatch.setattr(module, "pdf", long_pdf)
+    monkeypatch.setattr(module, "require_typst", lambda: None)
+    report = Arm.load("planar2r").report(tmp_path)
+    (line,) = [record.getMessage() for record in caplog.records if "pages" in record.getMessage()]
+    assert (report.pages, len(tried)) == (MOST_PAGES + 1, 4)
+    assert line.endswith("31 pages, more than 30, even without programs in the appendix")
+    monkeypatch.setattr(module, "pdf", lambda document: Pdf(b"%PDF", MOST_PAGES))
+    caplog.clear()
+    Arm.load("planar2r").report(tmp_path)
+    assert not [record for record in caplog.records if "pages" in record.getMessage()]
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "planar2r", "stanford"])
+def test_the_family_of_inverse_kinematics_is_named_once(name):
+    description = library_robot(name)
+    paragraphs = [
+        block
+        for block in inverse_section(description, Attachments())
+        if isinstance(block, Paragraph)
+    ]
+    text = "\n".join("".join(map(str, block.parts)) for block in paragraphs).lower()
+    assert text.count(classify(description).fit.geometry.lower()) == 1
 
 
 def test_hostile_texts_are_shown_as_they_are(tmp_path):

@@ -18,6 +18,7 @@ from dhkit import __version__
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import AS_DESIGNED, as_designed_option
 from dhkit.cli.output import ReaderGone, say
+from dhkit.cli.quantities import with_plain_numbers
 from dhkit.cli.streams import clean_streams
 from dhkit.description.joint_text import DEGREES
 from dhkit.errors import DhkitError
@@ -69,8 +70,13 @@ class LazyCommand(TyperCommand):
     """A command whose module is imported when its arguments are parsed."""
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
-        """Parse arguments by the command itself."""
-        return load_command(str(self.name)).make_context(*arguments, **options)
+        """Parse arguments by the command itself; its numbers may be expressions."""
+        name = str(self.name)
+        command = load_command(name)
+        info_name, words, *others = arguments
+        function = getattr(import_module(command.callback.__module__), name.replace("-", "_"))
+        plain = with_plain_numbers(command, function, words)
+        return command.make_context(info_name, plain, *others, **options)
 
     def get_short_help_str(self, limit: int = 0) -> str:
         """Return the first paragraph of the command's docstring, of whatever length, without importing its module."""

@@ -14,10 +14,10 @@ import numpy as np
 from typer.core import TyperCommand
 
 from dhkit.arm import Arm
+from dhkit.cli.quantities import quantity
 from dhkit.description import Array, check_pose, pose
 from dhkit.description.joint_text import degrees_hint, joint_text, violated_limit_text
 from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import parse
 
 if TYPE_CHECKING:
     from dhkit.planning import Floor, Objective, Obstacle, Payload
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MAX_MATRIX_BYTES = 10_000
 """Largest size of a file with a matrix."""
-ANGLE_UNIT = re.compile(r"deg|°|\bpi\b", re.IGNORECASE)
+ANGLE_UNIT = re.compile(r"deg|°|\bpi\b|\brad\b", re.IGNORECASE)
 """Sign that an expression has its own unit of angles."""
 PLUS = re.compile(r"(?<![\d.][eE])\+")
 """A plus between two terms, not that of 1e+4."""
@@ -65,7 +65,7 @@ def numbers(words: Sequence[str], what: str, counts: Sequence[int]) -> Array:
             f"{what}: {len(expressions)} values; expected {' or '.join(map(str, counts))}"
         )
     try:
-        return np.array([float(parse(word)) for word in expressions])
+        return np.array([quantity(word) for word in expressions])
     except ExpressionError as error:
         raise DescriptionError(f"{what}: {error}") from None
 
@@ -116,10 +116,7 @@ def joint_values(
         raise DescriptionError(f"no such option: {option}")
     if len(expressions) != arm.n:
         raise DescriptionError(f"{len(expressions)} {what}; expected {arm.n} for {arm.name}")
-    if degrees and (found := next((word for word in expressions if ANGLE_UNIT.search(word)), None)):
-        raise DescriptionError(
-            f"{what}: found {found[:40]!r}; expected bare numbers, which are degrees with --degrees"
-        )
+    _require_bare(expressions, what, degrees)
     values = numbers(expressions, what, [arm.n])
     values = (
         np.where(arm.description.numbers.prismatic, values, np.radians(values))
@@ -127,6 +124,21 @@ def joint_values(
         else values
     )
     return _with_warning(arm, values, what, outside)
+
+
+def _require_bare(expressions: Sequence[str], what: str, degrees: bool) -> None:
+    """Refuse angles with a unit of their own where bare numbers are in degrees: they would be converted twice.
+
+    Raises
+    ------
+    DescriptionError
+        Names the expression.
+    """
+    found = next((word for word in expressions if ANGLE_UNIT.search(word)), None)
+    if degrees and found is not None:
+        raise DescriptionError(
+            f"{what}: found {found[:40]!r}; expected bare numbers, which are degrees with --degrees"
+        )
 
 
 def option_values(
@@ -178,6 +190,7 @@ def target(
     """
     if sum(given is not None for given in (xyz, matrix, like)) != 1:
         raise DescriptionError("no single pose; expected one of --xyz, --matrix and --like")
+    _require_bare(_split([euler]), "--euler", degrees)
     angles = numbers([euler], "--euler", [3])
     if found := next((x for x in angles if degrees_hint(x, slides=False)), None):
         sys.stderr.write(
@@ -248,8 +261,9 @@ def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed
     for name, text in given.items():
         if text is None:
             continue
-        values = np.broadcast_to(numbers([text], f"--{name}", sorted({1, arm.n})), arm.n)
         is_angle = degrees and name != "torque"
+        _require_bare(_split([text]), f"--{name}", is_angle)
+        values = np.broadcast_to(numbers([text], f"--{name}", sorted({1, arm.n})), arm.n)
         limits[name] = np.where(
             arm.description.numbers.prismatic | (not is_angle), values, np.radians(values)
         )

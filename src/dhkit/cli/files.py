@@ -14,8 +14,9 @@ from dhkit.arm import Arm
 from dhkit.cli.arguments import OutsideLimits, option_values, with_long_options
 from dhkit.cli.options import Json, Robot, Uniform, degrees_option, load_arm
 from dhkit.cli.output import print_json, report_files, say, say_written
+from dhkit.cli.quantities import quantity
 from dhkit.description.files import check_place
-from dhkit.errors import DescriptionError
+from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.model.cad_assembly import import_cad as import_assembly
 from dhkit.model.cad_files import LEFT_OUT
 
@@ -173,8 +174,8 @@ def _pairs(words: Sequence[str], option: str, example: str) -> dict[int, str]:
 
 def _mass(link: int, text: str) -> float:
     try:
-        return float(text)
-    except ValueError:
+        return quantity(text)
+    except ExpressionError:
         raise DescriptionError(f"--mass {link}={text[:40]}: expected a number of kg") from None
 
 

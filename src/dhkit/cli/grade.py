@@ -25,14 +25,15 @@ from dhkit.display import counted
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading import LIBRARY, grade as judge_sheet
 from dhkit.grading.answers.sheet import read_sheet, read_task
+from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.batch import GIGABYTE, Judge, grade_all
+from dhkit.grading.empty_sheet import template as empty_sheet
 from dhkit.grading.entry_points import prepare, robot_of
 from dhkit.grading.explanation import explanation_html, explanation_text
 from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.options import GradeOptions
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Rubric
-from dhkit.grading.schema import template as empty_sheet
 from dhkit.grading.sheets import find_sheets
 from dhkit.lab.assignment import Assignment, is_assignment
 from dhkit.lab.marks import find_records, lab_marks, lab_marks_csv
@@ -43,6 +44,7 @@ PRINTED = Delivery()
 
 @app.command()
 def grade(
+    context: typer.Context,
     sheets: Annotated[
         list[Path] | None,
         typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them."),
@@ -91,7 +93,8 @@ def grade(
         bool, typer.Option("--remark", help="Mark earlier reports (JSON) again, without judging.")
     ] = False,
     template: Annotated[
-        str | None, typer.Option(help="Print an empty sheet for this robot.")
+        str | None,
+        typer.Option(help="Print an empty sheet for this robot, and for what --task asks for."),
     ] = None,
     explain: Annotated[
         str | None, typer.Option(help="Print this robot's worked solution, step by step.")
@@ -108,10 +111,14 @@ def grade(
     unreadable.
     """
     if template is not None:
-        return _write_template(template, output)
+        _require_used(context, "--template", ("template", "task", "output"))
+        return _write_template(template, task, output)
     if explain is not None:
+        _require_used(context, "--explain", ("explain", "form", "output"))
         return _write_explanation(read_arm(explain), form, output)
     if sheets and task is not None and is_assignment(task):
+        records = ("sheets", "task", "form", "json", "output")
+        _require_used(context, f"{task}, a lab's assignment", records)
         return grade_records(sheets, task, "json" if json else form, output)
     if not sheets:
         raise DescriptionError(
@@ -119,7 +126,9 @@ def grade(
         )
     delivery = Delivery("json" if json else form, feedback, output, read)
     if remark:
-        return mark_again(sheets, rubric_of(rubric), delivery)
+        used = ("remark", "sheets", "task", "rubric", "form", "json", "feedback", "read", "output")
+        _require_used(context, "--remark", used)
+        return mark_again(sheets, _rubric_of_task(rubric, task), delivery)
     return grade_files(
         sheets,
         robot,
@@ -132,6 +141,34 @@ def grade(
         jobs=jobs,
         seconds=seconds,
     )
+
+
+def _require_used(context: typer.Context, mode: str, used: Collection[str]) -> None:
+    """Refuse options that a mode of the command has no use for: they would be ignored.
+
+    Parameters
+    ----------
+    context
+        The command as it was called.
+    mode
+        The mode, as messages name it.
+    used
+        Names of the parameters that count in this mode, besides the number of processes and their time.
+
+    Raises
+    ------
+    DescriptionError
+        Names the option.
+    """
+    harmless = ("jobs", "seconds", "as_designed")
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        if name in (*used, *harmless):
+            continue
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            found = "answer sheets" if name == "sheets" else parameter.opts[0]
+            raise DescriptionError(f"{mode}: found {found} too, which has no meaning there")
 
 
 def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | None) -> ExitStatus:
@@ -194,6 +231,19 @@ def rubric_of(path: Path | None) -> Rubric:
     rubric = Rubric() if path is None else Rubric.read(path)
     rubric.require_mistakes(LIBRARY, f"{path}: ")
     return rubric
+
+
+def _rubric_of_task(path: Path | None, task: Path | None) -> Rubric:
+    """Return the rubric of a file or else that of a task; without both, or if the task has none, the default rubric.
+
+    Raises
+    ------
+    AnswerError
+        A file is not a rubric or a task, or a mistake is not known.
+    """
+    if path is None and task is not None and (data := read_task(task).rubric):
+        return _rubric_from(data, task)
+    return rubric_of(path)
 
 
 def _own_rubric(path: Path) -> Rubric:
@@ -406,12 +456,33 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
         yield show
 
 
-def _write_template(robot: str, output: Path | None) -> ExitStatus:
-    """Print or write an empty answer sheet."""
+def _write_template(robot: str, task: Path | None, output: Path | None) -> ExitStatus:
+    """Print or write an empty answer sheet, of a task if one is given.
+
+    Raises
+    ------
+    DescriptionError
+        There is no such robot, or the task is about another one.
+    AnswerError
+        The task is not one, or is a lab's assignment, which has no sheets.
+    """
     description = read_arm(robot).description
     # A sheet finds robot files only in its own folder.
     name = Path(robot).name if robot.endswith(".toml") else description.name
-    return _deliver(empty_sheet(description, name), output)
+    read: AnswerSheet | None = None
+    if task is not None:
+        if is_assignment(task):
+            raise AnswerError(
+                f"--template: found a lab's assignment, {task}; expected a task of answer sheets"
+            )
+        read = read_task(task)
+        if read.robot:
+            if robot_of(read, task.parent).digest != description.digest:
+                raise DescriptionError(
+                    f"--template {robot}: {task} is about another robot; expected {read.robot}"
+                )
+            name = read.robot
+    return _deliver(empty_sheet(description, name, read), output)
 
 
 def _write_explanation(arm: Arm, form: str, output: Path | None) -> ExitStatus:

@@ -13,6 +13,7 @@ from typing import cast, get_args
 
 from rich.console import Console
 
+from dhkit.cli.grade_folder import MARKS, PARTS, clear_earlier_results
 from dhkit.cli.output import console, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
@@ -179,13 +180,18 @@ def _columns(graded: Sequence[Graded]) -> tuple[list[GradeReport], list[Marks]]:
 
 
 def _write_folder(graded: Sequence[Graded], shown: Sequence[Graded], folder: Path) -> None:
-    """Write the files of a class: marks, a page and full records for the teacher, and a page for each student."""
-    for name in ("students", "records"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-    for name, whole, part in zip(_names(graded), graded, shown, strict=True):
+    """Write the files of a class: marks, a page and full records for the teacher, and a page for each student.
+
+    Results of an earlier run in the folder are removed.
+    """
+    names = _names(graded)
+    clear_earlier_results(folder, names)
+    for part in PARTS:
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    for name, whole, one in zip(names, graded, shown, strict=True):
         write_atomically(folder / "records" / f"{name}.json", _json(whole, "full") + "\n")
-        write_atomically(folder / "students" / f"{name}.html", html_report(part.report, part.marks))
-    write_atomically(folder / "marks.csv", marks_csv(*_columns(graded)))
+        write_atomically(folder / "students" / f"{name}.html", html_report(one.report, one.marks))
+    write_atomically(folder / MARKS, marks_csv(*_columns(graded)))
     write_atomically(folder / "class.html", html_class(*_columns(graded)))
 
 

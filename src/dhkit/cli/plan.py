@@ -29,6 +29,7 @@ from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import PlanOptions, PlanReport, Progress, ToolSpeed
 from dhkit.planning.along.path_motion import DEFAULT_INTERVALS as PATH_INTERVALS
+from dhkit.planning.certificate.collision_avoidance import NOT_LOOKED_FOR
 from dhkit.planning.plan_report import more_text, seconds_text
 from dhkit.planning.program import MAX_ITERATIONS
 from dhkit.trajectories import JointPath, Limits, Trajectory, joint_path, tool_line
@@ -207,7 +208,7 @@ def plan(
 ) -> ExitStatus:
     """Plan the best motion to joint values or a pose, certified; exit status 1 where there is none.
 
-    Prismatic joints are in m and N. Numbers may be expressions such as 17*inch or pi/2.
+    Prismatic joints are in m and N. Numbers may be expressions such as 17*inch, 20*mm or pi/2.
     """
     arm = load_arm(robot, uniform)
     pose = {"xyz": xyz, "matrix": matrix, "like": like}
@@ -342,21 +343,18 @@ def _print(
     say(f"{seconds_text(report.duration)}{cost}\n")
     _print_joints(arm, motion, limits, degrees)
     worst = certificate.worst
-    verdict = (
-        "all limits kept" if certificate.ok else f"limits exceeded by {certificate.violation:.1e}"
-    )
     active = [(name, share) for name, share in report.active_limits() if share >= MIN_ACTIVE_SHARE]
     active_text = ", ".join(f"{name} {100 * share:.0f} %" for name, share in active) or "none"
-    say(f"\ncertificate: {verdict} in {certificate.states} states, by {certificate.reference}")
+    say(
+        f"\ncertificate: {certificate.verdict} in {certificate.states} states, by {certificate.reference}"
+    )
     if worst is not None:
-        say(
-            f"nearest to its limit: {worst.what}, {max(-100 * worst.excess, 0.0):.2g} % left at {worst.time:.3f} s"
-        )
+        say(f"nearest to its limit: {worst.what}, {worst.margin} at {worst.time:.3f} s")
     say(f"some limit reached in {100 * certificate.any_active:.0f} % of the time: {active_text}")
     if report.unlimited:
         say(f"not limited: {', '.join(report.unlimited)}")
     if report.collisions_not_asked_for:
-        say(f"collisions not looked for: {report.collisions_not_asked_for}")
+        say(f"{NOT_LOOKED_FOR}: {report.collisions_not_asked_for}")
     if report.slow_down > 1:
         say(f"slowed down by {100 * (report.slow_down - 1):.3g} % to keep its limits between knots")
     if report.tightened:

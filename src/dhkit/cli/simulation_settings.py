@@ -10,6 +10,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.cli.arguments import columns, numbers, option_values, split_at
 from dhkit.cli.demo_motions import moved_configurations
+from dhkit.cli.quantities import quantity
 from dhkit.control import (
     CONTROLLERS,
     Controller,
@@ -21,7 +22,7 @@ from dhkit.control import (
 from dhkit.description import Array, Payload
 from dhkit.description.joint_text import joint_text
 from dhkit.dynamics import Friction
-from dhkit.errors import DescriptionError
+from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.trajectories import Trajectory, read_motion
 
 NO_CONTROLLER = "none"
@@ -142,8 +143,8 @@ def _friction_of(text: str) -> bool | Friction:
     if text in ("none", "stiction"):
         return text == "stiction"
     try:
-        width = float(text)
-    except ValueError:
+        width = quantity(text)
+    except ExpressionError:
         raise DescriptionError(
             f"--friction: found {text!r}; expected none, stiction or a width in rad/s"
         ) from None

@@ -41,7 +41,7 @@ def grade(
     options: GradeOptions | None = None,
     **keywords: Unpack[GradeKeywords],
 ) -> GradeReport:
-    """Judge an answer sheet, or the answers that a program or a paper assigns.
+    r"""Judge an answer sheet, or the answers that a program or a paper assigns.
 
     Nothing in it is executed unless ``execute`` is set.
 
@@ -59,12 +59,26 @@ def grade(
         Fields of :class:`GradeOptions`, as one value or one by one: ``task``, ``seed``, ``explain``, ``execute``,
         ``isolation``.
 
+    Returns
+    -------
+    GradeReport
+        The verdict of every entry, with witnesses and mistakes.
+
     Raises
     ------
     AnswerError
         The sheet cannot be judged; the message names the key, the value found and the value expected.
     DescriptionError
         The robot file describes no robot.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> answer = ["9.81*((m1/2 + m2)*l1*cos(q1) + m2*l2*cos(q1 + q2)/2)", "9.81*m2*l2*cos(q1 + q2)/2"]
+    >>> lines = ["format = 1", 'robot = "planar2r"', "[answer]", f"g = {answer}"]
+    >>> size = Path("answer.toml").write_text("\n".join(lines))
+    >>> grade("answer.toml").verdict.value
+    'correct'
     """
     chosen = GradeOptions.of(options, keywords)
     path = Path(path)
@@ -152,10 +166,22 @@ def grade_answers(
     seed, explain
         As for :func:`grade`.
 
+    Returns
+    -------
+    GradeReport
+        The verdict of every entry, with witnesses and mistakes.
+
     Raises
     ------
     AnswerError
         Answers that cannot be judged.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> report = grade_answers(library_robot("planar2r"), {"M": [["m1", 0], [0, "m2*l2^2/3"]]})
+    >>> report.verdict.value
+    'wrong'
     """
     entries: dict[str, object] = {}
     for name, value in answers.items():
@@ -174,6 +200,18 @@ def grade_answers(
 
 def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     """Return the robot that a sheet names: one of the library, or a file in the sheet's own folder.
+
+    Parameters
+    ----------
+    sheet
+        Answer sheet.
+    folder
+        Folder of the sheet, in which a robot file must lie.
+
+    Returns
+    -------
+    Description
+        The robot.
 
     Raises
     ------

@@ -78,6 +78,19 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
         Report on a sheet.
     rubric
         Weights and penalties.
+
+    Returns
+    -------
+    Marks
+        Points of the sheet, its quantities and its entries, with the rule that decided each.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.grading import Rubric, grade_answers
+    >>> report = grade_answers(library_robot("planar2r"), {"M": [["m1", 0], [0, "m2*l2^2/3"]]}, explain=False)
+    >>> marks(report, Rubric(points=8)).points
+    2.0
     """
     if report.error or not report.entries:
         return Marks(0.0, rubric.points)

@@ -1,4 +1,4 @@
-"""Forms of answer sheets, tasks and rubrics: an empty sheet, and JSON Schemas made from the tables that check them."""
+"""Forms of answer sheets, tasks and rubrics: JSON Schemas made from the tables that check them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any, TypeAlias
 
 from pydantic import TypeAdapter
 
-from dhkit.description import Description
 from dhkit.description.schema import titled_schema
 from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.quantity_names import SMALL_HEADS
@@ -24,7 +23,6 @@ from dhkit.grading.answers.sheet import (
 )
 from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.rubric import WEIGHED, Rubric
-from dhkit.kinematics import classify
 
 Schema: TypeAlias = dict[str, Any]
 """A JSON Schema, or a part of one."""
@@ -262,62 +260,3 @@ def _choice(key: str, description: str) -> Schema:
 def _whole(pattern: str) -> str:
     """Return a pattern that matches whole texts only, though JSON Schema searches."""
     return f"^(?:{pattern})$"
-
-
-# An empty sheet
-
-_TEMPLATE_QUANTITIES = ("K", "V", "M", "C", "g", "tau")
-"""Quantities with entries in an empty sheet; others are in its comments."""
-
-
-def template(description: Description, robot: str | None = None) -> str:
-    """Return an empty answer sheet as TOML; entries that stay empty are not handed in.
-
-    Parameters
-    ----------
-    description
-        The robot.
-    robot
-        Robot as the sheet names it: a library name, or a file beside the sheet; by default the description's name.
-    """
-    n = description.n
-    variables = ", ".join(f"q{i + 1}" for i in range(n))
-    symbols = ", ".join(description.parameters) or "none: numbers, SI and radians"
-    lines = [
-        f"# Answers for {description.name}; what stays empty is not handed in, and part of a quantity is incomplete.",
-        f"# Joint variables: {variables} (or th1, theta_1, ...), rates qd1 (q1dot, dq1), accelerations qdd1.",
-        f"# Sums of angles: c12 for cos(q1 + q2), s1 for sin(q1). Parameters: {symbols}.",
-        "format = 1",
-        f'robot = "{robot or description.name}"',
-        'student = ""',
-        "",
-        "[names]                      # your own names, where they differ",
-        "# q = [" + ", ".join(f'"th{i + 1}"' for i in range(n)) + "]",
-        '# angles = "absolute"        # if angles count from a fixed direction',
-        '# parameters = { lc1 = "l1/2" }',
-        "",
-        "[answer]",
-        *(f"{name} = {_empty(shape_of(name, n))}" for name in _TEMPLATE_QUANTITIES),
-        *(f"# A{i + 1} = {_empty((4, 4))}" for i in range(n)),
-        f"# J = {_empty((6, n))}",
-        "",
-        "# [answer.dh]                # theta, d, a, alpha; SI and radians",
-        f'# convention = "{description.convention.value}"',
-        "# rows = [" + ", ".join('["", "", "", ""]' for _ in range(n)) + "]",
-    ]
-    if classify(description).family is not None:
-        lines += [
-            "",
-            "# [answer.ik]                # joint by joint from T: px, py, pz, r11 ... r33, and joints found before;",
-            "#                            # lengths by name or row (a2, d3); D = ... in equation defines a quantity",
-            "# steps = [                  # for two solutions: ±, or a list",
-            *(f'#   {{ joint = {i + 1}, equation = "", solution = "" }},' for i in range(n)),
-            "# ]",
-        ]
-    return "\n".join(lines) + "\n"
-
-
-def _empty(shape: tuple[int, ...]) -> str:
-    if not shape:
-        return '""'
-    return "[" + ", ".join([_empty(shape[1:])] * shape[0]) + "]"

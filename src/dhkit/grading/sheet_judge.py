@@ -45,7 +45,7 @@ from dhkit.grading.judging.functions import judge_function, judge_sampled
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import Truth, truth_of
-from dhkit.grading.mistakes.entries import shown_in_own_angles
+from dhkit.grading.mistakes.entries import shown_in_student_angles
 from dhkit.grading.mistakes.explaining import explain as explain_mistakes
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.symbolic.ring import RingError
@@ -449,7 +449,7 @@ def _entries(
     truth: Truth, quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]
 ) -> Iterator[Entry]:
     for given in quantity.given:
-        finding = shown_in_own_angles(truth, quantity.name, quantity.findings[given.index])
+        finding = shown_in_student_angles(truth, quantity.name, quantity.findings[given.index])
         text, latex = typeset(given.tree) if given.tree is not None else ("", "")
         yield Entry(
             quantity.name,

@@ -56,10 +56,12 @@ PANELS = (
     "workspace",
     "control",
     "transforms",
-    "submit",
+    "answers",
     "own",
 )
 """Names of the lab's panels that an assignment may show, in the order in which the page lists them."""
+EARLIER_PANELS = {"submit": "answers"}
+"""Names that panels had in earlier versions, which assignments may still have."""
 DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that change the direction of the text after them, and so the text that a reader sees."""
 
@@ -113,6 +115,7 @@ def _in_one_line(text: str) -> str:
 
 
 def _panel(name: str) -> str:
+    name = EARLIER_PANELS.get(name, name)
     if name not in PANELS:
         raise PydanticCustomError("text", f"no panel {name[:40]!r}{_hint(name, PANELS)}")
     return name

@@ -13,6 +13,7 @@ from dhkit.arm import Arm
 from dhkit.description import Robot, description_of
 from dhkit.display import repr_line
 from dhkit.errors import ModelError
+from dhkit.lab.answers_panel import AnswersPanel
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import Desk
@@ -24,7 +25,6 @@ from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_panel import PythonPanel
 from dhkit.lab.record import taken_up
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
-from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import TablePanel
 from dhkit.lab.task_panel import TaskPanel
 from dhkit.lab.tool_panel import ToolPanel
@@ -104,7 +104,7 @@ class Lab:
         self._motions = MotionPanel(desk, jobs, obstacles)
         self._own = OwnPanel(desk, own, isolation, self._lock)
         self._control = ControlPanel(desk, self._motions, self._own)
-        submitted = SubmitPanel(desk, self._lock)
+        judged_answers = AnswersPanel(desk, self._lock)
         self._panels: tuple[Panel, ...] = (
             JointPanel(desk),
             self._tool,
@@ -114,10 +114,17 @@ class Lab:
             self._control,
             DynamicsPanel(desk, self._lock),
             WorkspacePanel(desk, self._lock),
-            submitted,
+            judged_answers,
             TransformsPanel(desk, solid_read),
             TaskPanel(
-                desk, self._motions, self._own, submitted, self._control, assignment, record, work
+                desk,
+                self._motions,
+                self._own,
+                judged_answers,
+                self._control,
+                assignment,
+                record,
+                work,
             ),
             PythonPanel(desk, table, self._tool, self._motions, self._control, loaded_from),
             self._own,

@@ -15,6 +15,7 @@ from dhkit.description import Array, Description
 from dhkit.description.frames import has_same_geometry
 from dhkit.errors import DhkitError, ExpressionError
 from dhkit.expressions import parse
+from dhkit.lab.answers_panel import AnswersPanel
 from dhkit.lab.assignment import (
     AnswerRight,
     Assignment,
@@ -34,7 +35,6 @@ from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.record import MAX_NAME_LENGTH, Reached, Record, motion_evidence, now, taken_up
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
-from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import plain_expression
 
 LEAST_STROKE = 5.0
@@ -66,7 +66,7 @@ class TaskPanel(Panel):
         desk: Desk,
         motions: MotionPanel,
         own: OwnPanel,
-        answered: SubmitPanel,
+        answered: AnswersPanel,
         control: ControlPanel,
         assignment: Assignment | None,
         file: Path | None = None,

@@ -12,7 +12,10 @@ from dhkit.description import Array
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
-from dhkit.planning.certificate.collision_avoidance import BETWEEN_LINKS, FROM_OBSTACLES
+from dhkit.planning.certificate.collision_avoidance import (
+    NOT_LOOKED_FOR,
+    collisions_not_asked_for,
+)
 from dhkit.planning.criteria import Limit, States, cost_of
 from dhkit.planning.program import Task, Work
 from dhkit.planning.search import PlannedMotion
@@ -117,13 +120,7 @@ class PlanReport:
     @property
     def collisions_not_asked_for(self) -> str:
         """Bodies whose contact nobody asked to avoid, in words; empty if obstacles and links were both asked for."""
-        asked = self.clear_of if self.clearance is not None else ""
-        missing = []
-        if FROM_OBSTACLES not in asked:
-            missing.append("with obstacles")
-        if BETWEEN_LINKS not in asked:
-            missing.append(BETWEEN_LINKS)
-        return ", ".join(missing)
+        return collisions_not_asked_for(self.clear_of if self.clearance is not None else "")
 
     @property
     def sensitivity(self) -> float | None:
@@ -228,7 +225,7 @@ class PlanReport:
         if self.unlimited:
             facts.append(("not limited", ", ".join(self.unlimited)))
         if self.collisions_not_asked_for:
-            facts.append(("collisions not looked for", self.collisions_not_asked_for))
+            facts.append((NOT_LOOKED_FOR, self.collisions_not_asked_for))
         if self.slow_down > 1:
             facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.3g} %"))
         if self.coarse is not None:
@@ -253,11 +250,7 @@ class PlanReport:
 
     @property
     def _certified(self) -> str:
-        return (
-            "certified"
-            if self.certificate.ok
-            else f"exceeds a limit by {100 * self.certificate.violation:.2g} %"
-        )
+        return "certified" if self.certificate.ok else self.certificate.verdict
 
     def as_dict(self) -> dict[str, object]:
         """Return the report as numbers and texts, for JSON."""
@@ -327,8 +320,8 @@ class PlanReport:
         else:
             worst = certificate.worst
             lines.append(
-                f"{kept}: largest excess {max(certificate.violation, 0.0):.1e}; nearest to its limit: {worst.what} "
-                f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
+                f"{kept}: {certificate.verdict}; nearest to its limit: {worst.what} ({worst.margin}) at "
+                f"{worst.time:.3f} s"
             )
         if certificate.sampled:
             lines.append(
@@ -353,7 +346,7 @@ class PlanReport:
         if self.unlimited:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
         if self.collisions_not_asked_for:
-            lines.append(f"collisions not looked for: {self.collisions_not_asked_for}")
+            lines.append(f"{NOT_LOOKED_FOR}: {self.collisions_not_asked_for}")
         lines += self.notes
         if self.coarse is not None:
             more = more_text(self.sensitivity or 0.0)

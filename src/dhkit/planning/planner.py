@@ -59,6 +59,7 @@ from dhkit.planning.search import (
 )
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
+from dhkit.trajectories.limits import ADVICE_ON_LIMITS
 
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
@@ -337,7 +338,7 @@ class Planner:
             duration = DEFAULT_DURATION_FACTOR * float(leg_durations(arm, limits, points).sum())
             if not duration > 0:
                 raise PlanningError(
-                    f"nothing limits how fast {self.objective} may be: give a duration, or limits"
+                    f"nothing limits how fast {self.objective} may be: {ADVICE_ON_LIMITS}"
                 )
         avoidance = request.avoidance
         if avoidance:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,11 +39,12 @@ from dhkit.report.sections.velocities import velocities_section
 from dhkit.report.words import PROGRAMS, Attachments, name_of, source_of
 from dhkit.trajectories import Trajectory, read_motion
 
+log = logging.getLogger(__name__)
 FORMATS = ("pdf", "html", "tex")
 MOST_PAGES = 30
 """Largest number of pages (Cao 2011, step 7)."""
 _LISTED_LINES = (240, 120, 60, 0)
-"""Lines of programs in the appendix: the first number that leaves the report within its pages is taken."""
+"""Lines of programs in the appendix: the first number that leaves the report within its pages is taken, or the last."""
 _LISTED_WIDTH = 100
 """Columns of a line of a program in the appendix."""
 _REFERENCES = (
@@ -113,6 +115,11 @@ def article(
     run
         A simulation that it shows besides the comparison of controllers; one of an arm with locked joints stands for
         the simplified model on which control is tried.
+
+    Returns
+    -------
+    Article
+        Title, sections, figures and programs, before they are printed.
 
     Raises
     ------
@@ -222,6 +229,11 @@ def write_report(
     format
         ``"pdf"``, ``"html"`` or ``"tex"``.
 
+    Returns
+    -------
+    Report
+        The files written.
+
     Raises
     ------
     ValueError
@@ -256,6 +268,13 @@ def write_report(
             printed = pdf(_with_appendix(content, lines))
             if printed.pages <= MOST_PAGES:
                 break
+        else:
+            log.warning(
+                "%s: %d pages, more than %d, even without programs in the appendix",
+                place / "report.pdf",
+                printed.pages,
+                MOST_PAGES,
+            )
         files["report.pdf"] = printed.content
         pages = printed.pages
     elif format == "html":

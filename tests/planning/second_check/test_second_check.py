@@ -181,7 +181,7 @@ def test_a_certificate_that_overlooks_a_collision_is_refuted(puma, motion, monke
     assert puma.certify(motion, limits, obstacles=scene).ok
     certificate = puma.certify(motion, limits, obstacles=scene, independent=True)
     assert not certificate.ok and certificate.violation <= 0
-    assert "refuted by the second check: " in repr(certificate)
+    assert "refuted by the second check, " in repr(certificate)
     assert "ball" in certificate.independent.refutations[0].what
 
 

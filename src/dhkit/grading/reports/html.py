@@ -54,9 +54,7 @@ def html_report(report: GradeReport, marks: Marks) -> str:
 
 def html_class(reports: Sequence[GradeReport], marks: Sequence[Marks], title: str = "Class") -> str:
     """Return the page of a class: mistakes with their frequency, a table of marks, then the sheets in order."""
-    parts = [
-        f'<p class="error">{_text(line)}</p>' for line in sentences.own_robot_warnings(reports)
-    ]
+    parts = [f'<p class="error">{_text(line)}</p>' for line in sentences.class_warnings(reports)]
     parts += [*_mistake_bars(reports), "<h2>Marks</h2>", _marks_table(reports, marks)]
     for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):
         parts.append(f'<section id="sheet-{number}">\n<h2>{_sheet_name(report, number)}</h2>')

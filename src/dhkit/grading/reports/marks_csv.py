@@ -32,6 +32,11 @@ def cell(text: str) -> str:
     return f"'{text}" if text.startswith(_FORMULA) and not _NUMBER.fullmatch(text) else text
 
 
+def marks_key(report: GradeReport) -> tuple[str, str]:
+    """Return the cells of a report's row that tell it from the others: student and sheet."""
+    return cell(plain(report.student)), cell(plain(report.sheet or ""))
+
+
 def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     """Return the marks of sheets as CSV text, in the order given."""
     all_marks = chain.from_iterable(sheet.quantities for sheet in marks)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import PurePath
 
 from dhkit import display
 from dhkit.grading.bounds import BOUNDS
@@ -134,13 +135,33 @@ def provenance(report: GradeReport) -> str:
     return f"dhkit {plain(report.version, 40)}, {plain(report.robot, 80)}, digest {plain(report.digest, 80)}{seed}"
 
 
-def own_robot_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
+def class_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
+    """Yield what a teacher has to know before reading the marks of a class."""
+    yield from _own_robot_warnings(reports)
+    yield from _repeated_students(reports)
+
+
+def _own_robot_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
     """Yield a warning if sheets named the robots they were judged by: a student may choose an easier robot."""
     own = sorted(
         {plain(report.robot, 40) for report in reports if report.own_robot and report.robot}
     )
     if own:
         yield f"each sheet named its own robot ({', '.join(own)}): give the task's by --robot or --task"
+
+
+def _repeated_students(reports: Sequence[GradeReport]) -> Iterator[str]:
+    """Yield a line for each student with several sheets, which says that none of them is preferred."""
+    sheets: dict[str, list[str]] = {}
+    for report in reports:
+        if report.student:
+            sheets.setdefault(report.student, []).append(PurePath(report.sheet or "").name)
+    for student, names in sheets.items():
+        if len(names) > 1:
+            yield (
+                f"{plain(student, 60)} has {len(names)} sheets ({plain(', '.join(names), 200)}): "
+                "each is judged and has a row of its own, and none is preferred"
+            )
 
 
 def mistake_counts(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:

@@ -82,7 +82,7 @@ def terminal_class(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> Re
             Text(points_of(mark)),
             Text(sentences.fault_of(report) if report.error else plain(report.sheet or "", 120)),
         )
-    lines = [Text(line, style="yellow") for line in sentences.own_robot_warnings(reports)]
+    lines = [Text(line, style="yellow") for line in sentences.class_warnings(reports)]
     return Group(*lines, table, *_mistake_bars(sentences.mistake_counts(reports), len(reports)))
 
 

@@ -45,6 +45,8 @@ _SAME_ERROR = 1.5
 """Factor up to which the errors of two tables count as equal."""
 _LENGTH_RESOLUTION = 1e-9
 """Lengths of a table up to this, m, count as 0 where two tables are compared; tables are written to this decimal."""
+_ANGLE_RESOLUTION = 1e-12
+"""Differences of angles up to this, rad, are those of doubles: a number that differs by more was rounded."""
 _MAX_TABLE_ERROR = 1e-6
 """Largest error of a table, as a share of the arm's size: axis tilts below the resolution of doubles give 3e-8."""
 
@@ -130,10 +132,22 @@ def extract_dh(
     name
         The robot's name; the URDF's, with the tip's where it has several chains, if not given.
 
+    Returns
+    -------
+    Extraction
+        The description, its differences from the file in tool, M and g at random states, and notes.
+
     Raises
     ------
     ModelError
         The file is refused, or has no such chain.
+
+    Examples
+    --------
+    >>> from dhkit.description import asset
+    >>> extraction = extract_dh(asset("urdf/puma560.urdf"))
+    >>> extraction.description.n
+    6
     """
     known = [value.value for value in Convention]
     if convention not in known:
@@ -194,7 +208,7 @@ def extracted(
     else:
         notes.append(f"differs from the file by {residual}")
         lengths = np.concatenate([description.numbers.a, description.numbers.d])
-        if recommendation := _smaller_as_designed(
+        if recommendation := _advice_on_rounded_numbers(
             chain, convention, int(np.count_nonzero(lengths))
         ):
             notes.append(recommendation)
@@ -331,19 +345,47 @@ def _longest(table: Table) -> float:
     return float(np.abs(table.rows[:, 1:3]).max())
 
 
-def _smaller_as_designed(chain: Chain, convention: Convention, lengths: int) -> str | None:
-    """Return a recommendation of ``as_designed`` if its table has fewer lengths a and d that are not 0; None if not."""
+def _advice_on_rounded_numbers(chain: Chain, convention: Convention, lengths: int) -> str | None:
+    """Return a recommendation of ``as_designed`` if angles or axes of the chain look rounded; None if none does.
+
+    Parameters
+    ----------
+    chain
+        The chain as it is written.
+    convention
+        That of the table.
+    lengths
+        Number of lengths a and d of its table that are not 0.
+    """
     tree = read_urdf(chain.path, as_designed=True)
     if not tree.changes:
         return None
-    table = tidiest_table(_axes(chain_of(tree, chain.base, chain.tip)), convention)
+    designed_chain = chain_of(tree, chain.base, chain.tip)
+    table = tidiest_table(_axes(designed_chain), convention)
     designed = int(np.count_nonzero(np.abs(table.rows[:, 1:3]) > _LENGTH_RESOLUTION))
     if designed >= lengths:
-        return None
+        difference = _largest_difference(chain, designed_chain)
+        if difference <= _ANGLE_RESOLUTION:
+            return None
+        return (
+            f"the file's angles look rounded: as_designed=True (--as-designed) reads them as right angles, which turns "
+            f"axes and frames by up to {difference:.1g} rad"
+        )
     return (
         "as_designed=True (--as-designed) gives a smaller table: "
         f"{designed} lengths a and d that are not 0, not {lengths}"
     )
+
+
+def _largest_difference(chain: Chain, other: Chain) -> float:
+    """Return the largest difference of the rotations and the axes of two readings of one chain, rad to first order."""
+    differences = [0.0]
+    for joint, twin in zip(chain.joints, other.joints, strict=True):
+        differences.append(float(np.abs(joint.axis - twin.axis).max()))
+        for link in (joint.child, chain.tip):
+            turn = chain.zero_poses[link][:3, :3] - other.zero_poses[link][:3, :3]
+            differences.append(float(np.abs(turn).max()))
+    return max(differences)
 
 
 def _axes(chain: Chain) -> Axes:

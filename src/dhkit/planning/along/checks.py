@@ -12,7 +12,7 @@ from dhkit.planning.along.path_states import JUMP_ROUNDING, jumps
 from dhkit.planning.criteria import Limit, LoadedArm, States
 from dhkit.planning.request import CONSTRAINT_ROUNDING, require_holdable, require_inside_limits
 from dhkit.trajectories import JointPath, Limits
-from dhkit.trajectories.limits import farthest_outside
+from dhkit.trajectories.limits import advice_on_acceleration, farthest_outside
 
 REGULAR_POINTS = 8
 """Number of points of each piece of a path at which its derivative is examined."""
@@ -117,7 +117,8 @@ def require_kept(program: PathProgram[Profile]) -> None:
     )
     if task.objective.only_time and not (moves & limited).any():
         raise PlanningError(
-            "nothing limits acceleration along the path: no joint that moves has a limit of it, of jerk or of torque"
+            "nothing limits acceleration along the path: no joint that moves has a limit of it, of jerk or of torque; "
+            f"{advice_on_acceleration(task.arm)}"
         )
 
 

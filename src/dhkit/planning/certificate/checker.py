@@ -10,15 +10,18 @@ import numpy as np
 
 from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.description.robot import require_bodies
-from dhkit.display import html_block, html_table, repr_line, value_line
+from dhkit.display import counted, html_block, html_lines, html_table, repr_line, value_line
 from dhkit.planning.certificate.collision_avoidance import (
     NO_AVOIDANCE,
+    NOT_LOOKED_FOR,
     CollisionAvoidance,
+    collisions_not_asked_for,
     motion_constraints,
 )
 from dhkit.planning.criteria import Constraint, Limit, LoadedArm, PositionLimit, States, loaded
 from dhkit.planning.obstacles import Scene, not_checked
 from dhkit.planning.second_check import Recheck, recheck
+from dhkit.planning.second_check.result import distance_text
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import default_limits
@@ -61,6 +64,39 @@ class Check:
     """Whether ``row`` is a joint."""
     limit: int | None = None
     """Place among the constraints of the motion, see :class:`dhkit.planning.criteria.Limit`; None for jumps."""
+    clearance: float | None = None
+    """Distance asked for, m, of a check of distances, whose excess is what is missing of it, m; None for others."""
+    is_clearance_reduced: bool = False
+    """Whether less than the clearance was asked for near the ends, so that the excess alone gives no distance."""
+
+    @property
+    def margin(self) -> str:
+        """What is left up to the limit, in words; nothing of a limit that is exceeded."""
+        left = max(-self.excess, 0.0)
+        if self.clearance is not None:
+            return f"{1000 * left:.3g} mm to spare"
+        return f"{100 * left:.2g} % left"
+
+    @property
+    def place(self) -> str:
+        """Joint or row, and time, of the largest excess, in words."""
+        row = f"{'joint' if self.of_joint else 'row'} {self.row + 1}, "
+        return f"{'' if self.clearance is not None else row}at {self.time:.4g} s"
+
+    @property
+    def statement(self) -> str:
+        """Whether the limit is kept, and by how much it is exceeded, in words."""
+        if self.excess <= 0:
+            return f"{self.what} kept"
+        if self.limit is None:
+            return f"{self.what}: {100 * self.excess:.3g} % of the motion's own size"
+        if self.clearance is None:
+            return f"{self.what} exceeded by {100 * self.excess:.3g} %"
+        found = ""
+        if not self.is_clearance_reduced:
+            found = f"{distance_text(self.clearance - self.excess)} found, "
+        asked = f"{1000 * self.clearance:.3g} mm asked for"
+        return f"{self.what} missed by {1000 * self.excess:.3g} mm ({found}{asked})"
 
     __repr__ = value_line
 
@@ -93,6 +129,8 @@ class Certificate:
     """Quantities of which nothing is known: torques of links without a body, and distances that were not measured."""
     independent: Recheck | None = None
     """Result of the second check; None unless asked for."""
+    collisions_not_asked_for: str = ""
+    """Bodies whose contact nobody asked to look for, in words; empty if obstacles and links were both asked for."""
 
     @property
     def violation(self) -> float:
@@ -122,31 +160,58 @@ class Certificate:
         return max(self.checks, key=lambda check: check.excess, default=None)
 
     def __repr__(self) -> str:
-        return repr_line("Certificate", summary=self._summary)
+        return repr_line("Certificate", summary="; ".join(self._sentences))
+
+    def __str__(self) -> str:
+        first, *others = self._sentences
+        exceeded = [check for check in self.checks if check.excess > ACCEPTED_EXCESS]
+        if exceeded:
+            first = f"{counted(len(exceeded), 'limit')} exceeded, in {self._grid}"
+        lines = [first]
+        exceeded.sort(key=lambda check: -check.excess)
+        lines += [f"{check.statement}, {check.place}" for check in exceeded]
+        if self.worst is not None and not exceeded:
+            worst = self.worst
+            lines.append(f"nearest to its limit: {worst.what}, {worst.margin}, {worst.place}")
+        return "\n".join([*lines, *others])
 
     def _repr_html_(self) -> str:
         rows = []
         for check in sorted(self.checks, key=lambda check: -check.excess):
-            state = f"{-100 * check.excess:.2g} % left"
-            if check.excess > 0:
-                state = f"exceeded by {100 * check.excess:.2g} %"
+            state = check.statement if check.excess > 0 else check.margin
             rows.append((check.what, str(check.row + 1), state, f"{check.time:.4g} s"))
         headings = ("limit", "joint or row", "at worst", "at")
-        return html_block(f"Certificate: {self._summary}", html_table(headings, rows, align="lr"))
+        first, *others = self._sentences
+        table = html_table(headings, rows, align="lr") if rows else ""
+        return html_block(f"Certificate: {first}", table, html_lines(others))
 
     @property
-    def _summary(self) -> str:
-        if self.worst is None:
-            return f"nothing is limited, {self.states} states"
-        if self.violation > ACCEPTED_EXCESS:
-            kept = f"{self.worst.what} exceeded by {100 * self.violation:.2g} %"
-        elif self.ok:
-            kept = "all limits kept"
-        else:
-            kept = f"refuted by the second check: {self.independent}"
-        only = f"; not proved between them: {', '.join(self.sampled)}" if self.sampled else ""
-        left_out = f"; not checked: {'; '.join(self.not_checked)}" if self.not_checked else ""
-        return f"{kept}, in {self.states} states by {self.reference}{only}{left_out}"
+    def verdict(self) -> str:
+        """Whether the limits are kept, in words: all of them, or by how much the worst is exceeded."""
+        if self.worst is None and self.ok:
+            return "nothing is limited"
+        if self.worst is not None and self.violation > ACCEPTED_EXCESS:
+            return self.worst.statement
+        return "all limits kept" if self.ok else "refuted by the second check"
+
+    @property
+    def _grid(self) -> str:
+        """Where the limits were checked, and by what, in words."""
+        return f"{self.states} states by {self.reference}"
+
+    @property
+    def _sentences(self) -> list[str]:
+        """The statement of the certificate, a sentence each: the verdict, and how far it reaches."""
+        sentences = [f"{self.verdict}, in {self._grid}"]
+        if self.independent is not None:
+            sentences.append(f"second check: {self.independent}")
+        if self.collisions_not_asked_for:
+            sentences.append(f"{NOT_LOOKED_FOR}: {self.collisions_not_asked_for}")
+        if self.sampled:
+            sentences.append(f"not proved between the states: {', '.join(self.sampled)}")
+        if self.not_checked:
+            sentences.append(f"not checked: {'; '.join(self.not_checked)}")
+        return sentences
 
 
 @takes_robot
@@ -182,6 +247,11 @@ def certify(
     independent
         Whether a second check, which shares no code with the first, searches the motion for violations that the first
         has overlooked: see :mod:`dhkit.planning.second_check`. It takes 0.05 to 1 s.
+
+    Returns
+    -------
+    Certificate
+        The worst use of each limit with its joint and time, what was proved, and what was sampled; ``.ok``.
 
     Raises
     ------
@@ -322,6 +392,12 @@ class Checker:
                 sampled += unproved
             else:
                 check = _check(constraint, k, use - 1, states.times)
+            if k == Limit.CLEARANCE:
+                check = replace(
+                    check,
+                    clearance=self.avoidance.clearance,
+                    is_clearance_reduced=self.avoidance.is_reduced,
+                )
             if k > Limit.CLEARANCE:
                 sampled.append(constraint.what)
             checks.append(check)
@@ -342,6 +418,7 @@ class Checker:
             any_active=min(float(share @ anywhere), 1.0),
             sampled=tuple(sampled),
             not_checked=_not_checked(self.description, self.limits, self.avoidance),
+            collisions_not_asked_for=collisions_not_asked_for(self.avoidance.clear_of),
         )
 
     def _check_of_torques(

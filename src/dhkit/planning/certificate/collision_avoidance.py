@@ -42,6 +42,8 @@ from dhkit.trajectories import Limits
 FROM_OBSTACLES = "from obstacles"
 BETWEEN_LINKS = "between links"
 """Bodies that a motion is kept clear of, in words of reports."""
+NOT_LOOKED_FOR = "collisions not looked for"
+"""Heading of the collisions that nobody asked to avoid, in reports and certificates."""
 BETWEEN = 0.1
 """Share of the clearance by which a distance may fall below it between two states of a certificate."""
 MIN_BETWEEN = 1e-3
@@ -54,6 +56,22 @@ way out of a narrow place."""
 LEAVING = 10.0
 """Travel of a link from its place at an end of a motion, as a multiple of the clearance, within which its clearance is
 reduced."""
+
+
+def collisions_not_asked_for(clear_of: str) -> str:
+    """Return the bodies whose contact nobody asked to avoid, in words; empty if obstacles and links were asked for.
+
+    Parameters
+    ----------
+    clear_of
+        Bodies from or between which a clearance is kept, in words.
+    """
+    missing = []
+    if FROM_OBSTACLES not in clear_of:
+        missing.append("with obstacles")
+    if BETWEEN_LINKS not in clear_of:
+        missing.append(BETWEEN_LINKS)
+    return ", ".join(missing)
 
 
 def _without_slack(required: Array) -> Array:
@@ -149,20 +167,30 @@ class CollisionAvoidance:
         """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, m."""
         if not self:
             return {}
-        clear_of = []
-        if self.obstacles:
-            clear_of.append(FROM_OBSTACLES)
-        if self.self_collision:
-            clear_of.append(BETWEEN_LINKS)
         reduced = (*self.reduced, *self._reduced_by_shapes)
         return {
             "clearance": self.clearance,
-            "clear_of": " and ".join(clear_of),
+            "clear_of": self.clear_of,
             "spare_clearance": -excess,
             "reduced_clearances": tuple(str(pair) for pair in reduced),
             "not_checked": not_checked(arm, self.obstacles, self.self_collision, self.clearance),
             "is_clearance_reduced_throughout": self.is_reduced_throughout,
         }
+
+    @property
+    def clear_of(self) -> str:
+        """Bodies from or between which the clearance is kept, in words; empty in free space."""
+        kept = []
+        if self.obstacles:
+            kept.append(FROM_OBSTACLES)
+        if self.self_collision:
+            kept.append(BETWEEN_LINKS)
+        return " and ".join(kept)
+
+    @property
+    def is_reduced(self) -> bool:
+        """Whether two bodies keep less than the clearance near the ends, or throughout."""
+        return bool(self.reduced or self._reduced_by_shapes)
 
     @property
     def _reduced_by_shapes(self) -> tuple[LinkClearance, ...]:

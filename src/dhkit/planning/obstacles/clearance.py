@@ -75,6 +75,8 @@ def distance(
 
     Parameters
     ----------
+    description
+        The robot.
     q
         Joint values, shape (..., n), rad and m.
     obstacles

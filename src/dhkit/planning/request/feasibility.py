@@ -15,6 +15,7 @@ from dhkit.planning.criteria import Constraint, LoadedArm, Objective, States
 from dhkit.planning.request.places import Place, Route
 from dhkit.planning.request.request import PlanRequest
 from dhkit.trajectories import Limits
+from dhkit.trajectories.limits import advice_on_acceleration
 
 CONSTRAINT_ROUNDING = 1e-6
 """Excess of a constraint, as a share of it, that counts as rounding."""
@@ -128,7 +129,7 @@ def _require_bounded(
         name = description.joints[int(np.flatnonzero(free)[0])].name
         raise PlanningError(
             f"joint {name} has neither a torque, an acceleration nor a jerk limit, so least time has no bound below; "
-            "give one of them (effort in the robot file, or limits=)"
+            f"{advice_on_acceleration(description)}"
         )
 
 

@@ -89,9 +89,7 @@ class PlannedMotion:
         certificate = task.checker.check(trajectory)
         if not certificate.ok:
             worst = max(certificate.checks, key=lambda check: check.excess)
-            raise PlanningError(
-                f"{worst.what} is exceeded by {100 * worst.excess:.2g} % at {worst.time:.3g} s"
-            )
+            raise PlanningError(f"{worst.statement} at {worst.time:.3g} s")
         cost = cost_of(task.objective, trajectory, task.loaded, task.friction)
         return cls(trajectory, certificate, cost, 1, is_resolved=False)
 

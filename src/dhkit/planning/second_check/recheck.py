@@ -59,6 +59,6 @@ def recheck(
             smallest = min(smallest, gap)
             if gap < claim.refuting:
                 refutations.append(
-                    Refutation(str(claim), gap, claim.kept, time_of(motion, instant))
+                    Refutation(str(claim), gap, claim.kept, time_of(motion, instant), "m")
                 )
     return Recheck(len(instants), smallest, tuple(refutations))

@@ -15,6 +15,18 @@ TOUCH = 1e-6
 """Depth, m, up to which two solids only touch."""
 
 
+def distance_text(distance: float) -> str:
+    """Return a distance of two bodies, m, in words; a negative one is the depth by which they overlap.
+
+    Examples
+    --------
+    >>> distance_text(0.0032), distance_text(-0.1)
+    ('a distance of 3.2 mm', 'an overlap of 100 mm')
+    """
+    kind = "an overlap" if distance < 0 else "a distance"
+    return f"{kind} of {1000 * abs(distance):.3g} mm"
+
+
 @dataclass(frozen=True)
 class Claim:
     """Two things whose distance a certificate claims."""
@@ -46,6 +58,18 @@ class Refutation:
     required: float
     time: float
     """s."""
+    unit: str = ""
+    """Unit of what was found and required: m of distances, empty of shares and of jumps."""
+
+    @property
+    def statement(self) -> str:
+        """What was found and what was required, in words."""
+        at = f"at {self.time:.4g} s"
+        if self.unit == "m":
+            return f"{self.what} {at}: {distance_text(self.found)} found, {1000 * self.required:.3g} mm asked for"
+        if self.required == 0:
+            return f"{self.what} {at}: by {self.found:.3g}"
+        return f"{self.what} {at}: {100 * self.found:.5g} % of its limit"
 
     __repr__ = value_line
 
@@ -72,3 +96,7 @@ class Recheck:
             else f"{len(self.refutations)} refuted, first {self.refutations[0].what}"
         )
         return repr_line("Recheck", f"{self.states} states", found)
+
+    def __str__(self) -> str:
+        found = "; ".join(one.statement for one in self.refutations) or "nothing refuted"
+        return f"{found}, in {self.states} states and around them"

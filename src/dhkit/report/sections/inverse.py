@@ -51,7 +51,8 @@ _FLAGS = {
 def inverse_section(description: Description, files: Attachments) -> Iterator[Block]:
     """Yield the section on inverse kinematics."""
     yield Heading("Inverse kinematics")
-    yield Paragraph(f"Geometry of the axes: {classify(description).words}.")
+    axes = classify(description)
+    yield Paragraph(f"Geometry of the axes: {axes.words}.")
     try:
         derivation = inverse_derivation(description)
     except DescriptionError as error:
@@ -59,7 +60,8 @@ def inverse_section(description: Description, files: Attachments) -> Iterator[Bl
         yield from _iteration(description)
         yield _prompt()
         return
-    yield from _derivation(derivation)
+    is_named = axes.fit is not None and axes.fit.geometry == derivation.geometry
+    yield from _derivation(derivation, is_geometry_named=is_named)
     yield from _example(derivation)
     proof = derivation.prove()
     yield Paragraph(*words(f"Check of the derivation: {proof.statement}."))
@@ -98,10 +100,11 @@ class _Writer:
         return Math(self.latex.element(element), self.typst.element(element))
 
 
-def _derivation(derivation: InverseDerivation) -> Iterator[Block]:
-    """Yield the steps."""
+def _derivation(derivation: InverseDerivation, *, is_geometry_named: bool) -> Iterator[Block]:
+    """Yield the steps, after the geometry of the axes unless the section has named it."""
     write = _Writer(derivation)
-    for sentence in introduction(derivation):
+    geometry, *sentences = introduction(derivation)
+    for sentence in sentences if is_geometry_named else [geometry, *sentences]:
         yield Paragraph(*words(sentence))
     for number_of_step, step in enumerate(derivation.steps, start=1):
         yield Heading(f"Step {number_of_step}: {heading_words(step.title)}", 2)

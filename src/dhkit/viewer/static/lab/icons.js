@@ -12,7 +12,7 @@ const PATHS = {
   workspace: "M10 16V9M10 9l4-3M4 16a7 7 0 1 1 12 0M3 16h14",
   control: "M3 10h4M13 10h4M7 6h6v8H7zM15 10v6H5v-6",
   transforms: "M4 14l5-3 5 3-5 3zM4 14V8l5-3 5 3v6M9 11V5M15 4l2 2-2 2",
-  submit: "M4 5h8M4 9h6M4 13h4M10 14l2 2 5-7",
+  answers: "M4 5h8M4 9h6M4 13h4M10 14l2 2 5-7",
   own: "M7 6l-4 4 4 4M13 6l4 4-4 4M11 4l-2 12",
 };
 

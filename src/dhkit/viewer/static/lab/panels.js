@@ -5,7 +5,7 @@ import { DynamicsPanel } from "./dynamics.js";
 import { JointPanel } from "./joints.js";
 import { MotionPanel } from "./motion.js";
 import { OwnPanel } from "./own.js";
-import { SubmitPanel } from "./submit.js";
+import { AnswersPanel } from "./answers.js";
 import { TaskPanel } from "./task.js";
 import { TablePanel } from "./table.js";
 import { ToolPanel } from "./tool.js";
@@ -28,7 +28,7 @@ export const PANELS = [
   [["control", "Control", ControlPanel]],
   [
     ["transforms", "Transforms", TransformsPanel],
-    ["submit", "Answers", SubmitPanel],
+    ["answers", "Answers", AnswersPanel],
     ["own", "My code", OwnPanel],
   ],
 ];

@@ -45,8 +45,8 @@ ENTRY_BEGIN = re.compile(r"^\s*([A-Za-z][A-Za-z0-9_]*)\s*=\s*(.*)$")
 """A line that begins an entry, such as ``M11 = …``; other lines continue the entry before them."""
 
 
-class SubmitPanel(Panel):
-    """Requests ``submit.…``."""
+class AnswersPanel(Panel):
+    """Requests ``answers.…``."""
 
     def __init__(self, desk: Desk, lock: AbstractContextManager[object]) -> None:
         super().__init__(desk)
@@ -55,7 +55,7 @@ class SubmitPanel(Panel):
         """Called with an answer's text and the names of its right entries."""
         desk.on_replace.append(self._clear)
 
-    @answers("submit.grade", "kind", "text")
+    @answers("answers.grade", "kind", "text")
     def grade(self, fields: Fields) -> None:
         """Judge an answer in the background; it is read as text, and never run."""
         kind = fields.choice("kind", SUFFIXES)
@@ -63,7 +63,7 @@ class SubmitPanel(Panel):
         self._clear()  # an answer that is refused must not leave the verdict of another
         if not text.strip():
             raise ValueError(
-                "submit.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot"
+                "answers.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot"
             )
         text = text.encode("utf-8", "replace").decode()  # UTF-8 has no lone surrogates
         content = _sheet(text) if kind == "lines" else text
@@ -72,12 +72,12 @@ class SubmitPanel(Panel):
             _require_robot(content, description.name)
         self.desk.view.panel("verdict", {"running": True})
         self.jobs.start(
-            "submit",
+            "answers",
             lambda job: _judge(description, content, SUFFIXES[kind], job),
             lambda state: self._take(text, state),
         )
 
-    @answers("submit.cancel")
+    @answers("answers.cancel")
     def cancel(self, _: Fields) -> None:
         """Stop judging."""
         self._clear()
@@ -115,13 +115,13 @@ def _sheet(text: str) -> str:
         if begin is not None:
             name = begin[1]
             if name in entries:
-                raise ValueError(f"submit.grade: line {number}: {name} is there twice")
+                raise ValueError(f"answers.grade: line {number}: {name} is there twice")
             entries[name] = begin[2].strip()
         elif name is not None:
             entries[name] = f"{entries[name]} {line.strip()}".strip()
         elif line.strip():
             raise ValueError(
-                f"submit.grade: line {number}: found {line.strip()[:40]!r}; expected such as M11 = ..."
+                f"answers.grade: line {number}: found {line.strip()[:40]!r}; expected such as M11 = ..."
             )
     return tomlkit.dumps({"format": 1, "answer": entries})
 
@@ -132,7 +132,7 @@ def _require_robot(text: str, name: str) -> None:
         robot = tomlkit.parse(text).get("robot")
         if isinstance(robot, str) and Path(robot).stem != name:
             raise ValueError(
-                f"submit.grade: the sheet is about {str(robot)[:60]!r}; the arm here is {name}"
+                f"answers.grade: the sheet is about {str(robot)[:60]!r}; the arm here is {name}"
             )
 
 

@@ -12,7 +12,7 @@ const KINDS = [
 ];
 const EXAMPLE = "M11 = ...\ng2 = ...";
 
-export class SubmitPanel {
+export class AnswersPanel {
   constructor(lab, root) {
     this.lab = lab;
     this.kind = h(
@@ -32,13 +32,13 @@ export class SubmitPanel {
       {
         type: "button",
         class: "main",
-        onclick: () => lab.ask("submit.grade", { kind: this.kind.value, text: this.text.value }),
+        onclick: () => lab.ask("answers.grade", { kind: this.kind.value, text: this.text.value }),
       },
       "Judge",
     );
     this.cancel = h(
       "button",
-      { type: "button", hidden: true, onclick: () => lab.ask("submit.cancel") },
+      { type: "button", hidden: true, onclick: () => lab.ask("answers.cancel") },
       "Cancel",
     );
     this.parameters = h("p", { class: "hint" });
