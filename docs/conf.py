@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 import importlib
-import re
 import sys
 from pathlib import Path
+from types import UnionType
+from typing import Annotated, Union, get_args, get_origin
 
+import numpy as np
+from numpy.typing import ArrayLike
 from sphinx import addnodes
 from sphinx.ext.napoleon.docstring import NumpyDocstring
 from sphinx.transforms.post_transforms import SphinxPostTransform
-from sphinx.util import inspect as sphinx_inspect
+from sphinx.util import inspect as sphinx_inspect, typing as sphinx_typing
 
 import dhkit
 from dhkit.cached_property import cached_property
@@ -98,7 +101,10 @@ sphinx_inspect.isproperty = is_property
 NumpyDocstring._parse_attributes_section = lambda self, section: self._format_fields(
     "Attributes", self._consume_fields(prefer_type=False)
 )
-NumpyDocstring._parse_attribute_docstring = lambda self: self._dedent(self._consume_to_end())
+# Sections after it, such as Raises, are read as those of a method.
+NumpyDocstring._parse_attribute_docstring = lambda self: NumpyDocstring(
+    self._dedent(self._consume_to_end()), self._config, self._app, "method"
+).lines()
 
 
 def homes() -> dict[str, str]:
@@ -231,24 +237,54 @@ def with_own_links(app, name: str, parent: str, content: list[str]) -> None:
         content[0] = content[0].replace("](docs/", "](")
 
 
-LONG_TYPE = re.compile(
-    r"~?(?:numpy\.)?ndarray\[tuple\[~?(?:typing\.)?Any, (?:\.\.\.|…)\], "
-    r"~?(?:numpy\.)?dtype\[~?(?:numpy\.)?(\w+)\]\]"
-)
-"""An array type of NumPy as Python evaluates it; the group is the type of its entries."""
+UNIONS = {"ArrayLike": set(get_args(ArrayLike)), "Robot": set(get_args(dhkit.description.Robot))}
+"""Unions that the sources name, with their members, which Python evaluates to one flat union."""
+_TYPE_TEXT = sphinx_typing.stringify_annotation
+_VALUE_TEXT = sphinx_inspect.object_description
 
 
-def with_short_types(app, what, name, value, options, signature, returns):
-    """Print the alias that the sources have instead of the type of NumPy that it stands for."""
-    return tuple(
-        text and LONG_TYPE.sub(r"NDArray[\1]", text).replace("NDArray[float64]", "Array")
-        for text in (signature, returns)
-    )
+def type_text(annotation, mode="fully-qualified-except-typing", **options) -> str:
+    """Return a type as the sources write it: the alias, instead of what it stands for."""
+    members = list(get_args(annotation))
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return type_text(members[0], mode, **options)
+    if origin is np.ndarray and len(members) == 2 and get_args(members[1]):
+        entry = get_args(members[1])[0]
+        name = getattr(entry, "__name__", str(entry))
+        return "Array" if entry is np.float64 else f"NDArray[{name}]"
+    if origin in (Union, UnionType):
+        names = []
+        for name, union in UNIONS.items():
+            if union and union <= set(members):
+                names.append(name)
+                members = [member for member in members if member not in union]
+        if names:
+            return " | ".join([*names, *(type_text(member, mode, **options) for member in members)])
+    return _TYPE_TEXT(annotation, mode, **options)
+
+
+def value_text(value, **options) -> str:
+    """Return a default as it is written: that of a field of pydantic is what its factory makes."""
+    factory = getattr(value, "default_factory", None)
+    if type(value).__name__ == "FieldInfo" and factory is not None:
+        value = factory()
+    return _VALUE_TEXT(value, **options)
+
+
+def replace_in_sphinx(old, new) -> None:
+    """Replace a function wherever a module of Sphinx has it by name."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith("sphinx"):
+            for key, value in list(vars(module).items()):
+                if value is old:
+                    setattr(module, key, new)
 
 
 def setup(app):
     """Register the resolution of names."""
-    app.connect("autodoc-process-signature", with_short_types)
+    replace_in_sphinx(_TYPE_TEXT, type_text)
+    replace_in_sphinx(_VALUE_TEXT, value_text)
     app.connect("source-read", with_own_pages)
     app.connect("include-read", with_own_links)
     app.connect("env-check-consistency", prepare)

@@ -85,6 +85,7 @@ ARM_SECTIONS = {
         "potential_energy",
         "power",
         "friction_torque",
+        "regressor",
         "casadi",
     ),
     "Equations of motion": ("derive", "lagrangian", "base_parameters", "grade"),

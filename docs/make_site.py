@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import check_links
+import make_examples
 import make_notebooks
 import make_pictures
 import make_reference
@@ -34,6 +35,7 @@ def main(options: list[str]) -> int:
     make_pictures.main()
     make_tables.main()
     make_notebooks.main()
+    make_examples.main()
     status = sphinx(
         [
             "-W",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import importlib
 import importlib.util
 import inspect
 import re
@@ -44,6 +45,7 @@ OTHER_COMMANDS = {"make", "pip", "git", "source", "ros2", "colcon", "octave", "g
 """Programs in console blocks that are not dhkit's; such lines are shown and not run."""
 SLOW_PAGES = {
     "docs/report.md",
+    "docs/how-to/identify-parameters.md",
     "docs/how-to/without-pinocchio.md",
     "docs/tutorials/08-trajectories.md",
     "docs/tutorials/09-control.md",
@@ -178,16 +180,40 @@ PUBLIC_METHODS = [
 def test_a_method_of_arm_explains_its_parameters_and_has_an_example(name):
     method = getattr(dhkit.Arm, name)
     text = inspect.getdoc(method)
-    section = text.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
-    explained = {
-        word.strip("* ")
-        for line in section.splitlines()
-        if line and not line.startswith(" ")
-        for word in line.split(",")
-    }
     parameters = set(inspect.signature(method).parameters) - {"self"}
-    assert parameters == explained, name
+    assert parameters == explained_parameters(text), name
     assert ">>> " in text, name
+
+
+def explained_parameters(docstring: str) -> set[str]:
+    """Return the names in a docstring's section of parameters."""
+    section = docstring.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
+    names: list[str] = []
+    for line in section.splitlines():
+        if line and not line.startswith(" "):
+            names += line.split(",")
+    return {name.strip("* ") for name in names}
+
+
+def public_functions():
+    """Yield the functions that the reference documents, by the path under which it does."""
+    made = documentation_module("make_reference")
+    for (package, name), home in made.home_places().items():
+        value = getattr(importlib.import_module(f"dhkit.{package}"), name)
+        if made.kind_of(value) == "function" and home == f"dhkit.{package}.{name}":
+            yield home, value
+
+
+def test_public_functions_explain_their_parameters_and_results():
+    functions = dict(public_functions())
+    assert len(functions) > 180
+    for name, function in functions.items():
+        text = inspect.getdoc(function)
+        signature = inspect.signature(function)
+        named = {parameter for parameter in signature.parameters if not parameter.startswith("_")}
+        assert explained_parameters(text) == named, name
+        if signature.return_annotation != "None":
+            assert "Returns\n-------\n" in text or "Yields\n------\n" in text, name
 
 
 def test_the_tutorials_are_notebooks_too():
@@ -202,6 +228,36 @@ def test_the_tutorials_are_notebooks_too():
         for source in sources:
             ast.parse(source)
         assert len(sources) == len(re.findall(r"^```python$", text, re.MULTILINE))
+
+
+def test_pages_show_the_outputs_of_notebooks(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    made = documentation_module("make_examples")
+    pages = {path.stem for path in (DOCS / "notebooks").glob("*.md")}
+    assert pages == set(made.NOTEBOOKS) == {path.stem for path in made.EXAMPLES.glob("*.ipynb")}
+
+    monkeypatch.setattr(made, "PAGES", tmp_path)
+    monkeypatch.setattr(made, "BESIDE", tmp_path)
+    frame = (
+        '<iframe sandbox="allow-scripts" srcdoc="&lt;p&gt;an arm" title="t"></iframe><p>A copy</p>'
+    )
+    data = [
+        {"text/html": frame, "text/plain": "<View>"},
+        {"image/png": "iVBORw0KGgo=", "text/plain": "<Figure>"},
+        {"text/latex": "\\begin{align*}\nq\n\\end{align*}\n\\begin{align*}\n1\n\\end{align*}"},
+        {"text/plain": "1 < 2"},
+    ]
+    outputs = [nbformat.v4.new_output("display_data", data=x) for x in data]
+    cell = nbformat.v4.new_code_cell("view", outputs=outputs)
+    text = made.page("mine", [nbformat.v4.new_markdown_cell("# Mine"), cell])
+    assert '<iframe sandbox="allow-scripts" src="mine-1.html" loading="lazy" title="t">' in text
+    assert (tmp_path / "mine-1.html").read_text() == "<p>an arm"
+    assert "(/_generated/notebooks/mine-2.png)" in text
+    assert "\\end{align*}\n\n\\begin{align*}" in text
+    assert "1 &lt; 2" in text
+    error = nbformat.v4.new_output("error", ename="ValueError", evalue="no", traceback=[])
+    with pytest.raises(RuntimeError, match="ValueError: no"):
+        made.output_block(error, "mine-5")
 
 
 def test_the_tables_are_made_of_the_results_of_benchmarks():

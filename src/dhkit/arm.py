@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dhkit.control.options import BatchKeywords, SimulationKeywords
     from dhkit.description import Body, Payload
     from dhkit.description.table_rows import Quantity
+    from dhkit.dynamics import ForwardDynamicsDerivatives, InverseDynamicsDerivatives
     from dhkit.grading import GradeReport, Rubric
     from dhkit.kinematics import (
         Classification,
@@ -1508,7 +1509,15 @@ class Arm:
 
         return friction_torque(self._description, qd, friction, out, threads)
 
-    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, base: bool = False) -> Array:
+    def regressor(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        base: bool = False,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array:
         """Return the matrix Y(q, qd, qdd) of inverse dynamics, which is linear in the inertial parameters.
 
         tau = Y theta + B qdd, where theta is :func:`dhkit.dynamics.inertial_parameters` and B is
@@ -1521,6 +1530,11 @@ class Arm:
             Joint values, rates and accelerations, shape (..., n), rad, m and seconds; batch axes broadcast.
         base
             Whether the columns are those of the base parameters, in the order of ``base_parameters().names``.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given. Not for
+            base parameters.
+        threads
+            Number of threads that share a large batch. Not for base parameters.
 
         Returns
         -------
@@ -1552,11 +1566,107 @@ class Arm:
         >>> arm.regressor(*motion, base=True).shape
         (2, 6)
         """
-        from dhkit.dynamics import regressor
-
         if base:
             return self.base_parameters().regressor(q, qd, qdd)
-        return regressor(self._description, q, qd, qdd)
+        if threads == 1 and (Y := self._calls.regressor(q, qd, qdd, out)) is not None:
+            return Y
+        from dhkit.dynamics import regressor
+
+        return regressor(self._description, q, qd, qdd, out, threads)
+
+    def inverse_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> InverseDynamicsDerivatives:
+        """Return the derivatives of the torques tau = M qdd + C qd + g, without friction, by q, qd and qdd.
+
+        Parameters
+        ----------
+        q, qd, qdd
+            Joint values, rates and accelerations, shape (..., n), rad, m and seconds; batch axes broadcast.
+        out
+            Array that receives all three, shape (..., 3, n, n), float64, C-contiguous; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        InverseDynamicsDerivatives
+            ``dtau_dq``, ``dtau_dqd`` and ``dtau_dqdd`` = M, shape (..., n, n) each, signs and meaning as in Pinocchio;
+            views of one array (..., 3, n, n). NaN where an input is not finite.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> found = Arm.load("planar2r").inverse_dynamics_derivatives([0, 0], [0, 0], [0, 0])
+        >>> found.dtau_dqdd.round(4)
+        array([[0.9217, 0.23  ],
+               [0.23  , 0.08  ]])
+        """
+        from dhkit.dynamics import InverseDynamicsDerivatives, inverse_dynamics_derivatives
+
+        if threads == 1:
+            stacked = self._calls.inverse_dynamics_derivatives(q, qd, qdd, out)
+            if stacked is not None:
+                return InverseDynamicsDerivatives.of(stacked)
+        return inverse_dynamics_derivatives(self._description, q, qd, qdd, out, threads)
+
+    def forward_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> ForwardDynamicsDerivatives:
+        """Return the derivatives of the accelerations qdd = M^-1 (tau - C qd - g), without friction, by q, qd and tau.
+
+        Parameters
+        ----------
+        q, qd, tau
+            Joint values, rates and torques, shape (..., n), rad, m, seconds, N m and N; batch axes broadcast.
+        out
+            Array that receives all three, shape (..., 3, n, n), float64, C-contiguous; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        ForwardDynamicsDerivatives
+            ``dqdd_dq``, ``dqdd_dqd`` and ``dqdd_dtau`` = M^-1, shape (..., n, n) each, signs and meaning as in
+            Pinocchio; views of one array (..., 3, n, n). NaN where an input is not finite or M is singular.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> found = Arm.load("planar2r").forward_dynamics_derivatives([0, 0], [0, 0], [0, 0])
+        >>> found.dqdd_dtau.round(3)
+        array([[  3.842, -11.046],
+               [-11.046,  44.256]])
+        """
+        from dhkit.dynamics import ForwardDynamicsDerivatives, forward_dynamics_derivatives
+
+        if threads == 1:
+            stacked = self._calls.forward_dynamics_derivatives(q, qd, tau, out)
+            if stacked is not None:
+                return ForwardDynamicsDerivatives.of(stacked)
+        return forward_dynamics_derivatives(self._description, q, qd, tau, out, threads)
 
     @cached_property
     def casadi(self) -> CasadiFunctions:

@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from dhkit.description import Array, Description
 from dhkit.dynamics.programs import dynamics_kernel
+from dhkit.dynamics.regressor import regressor_kernel
 from dhkit.errors import DescriptionError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
@@ -42,6 +43,9 @@ _QUANTITIES: Mapping[str, _Quantity] = {
     "gravity_torque": _dynamic("gravity_torque", lambda n: (n,)),
     "bias": _dynamic("bias", lambda n: (n,)),
     "inverse_dynamics": _dynamic("inverse_dynamics", lambda n: (n,)),
+    "regressor": _Quantity(regressor_kernel, lambda n: (n, 10 * n)),
+    "inverse_dynamics_derivatives": _dynamic("inverse_dynamics_derivatives", lambda n: (3, n, n)),
+    "forward_dynamics_derivatives": _dynamic("forward_dynamics_derivatives", lambda n: (3, n, n)),
     # The ordinary way says why an acceleration is missing.
     "forward_dynamics": _dynamic("forward_dynamics", lambda n: (n,), refuses_nan=True),
 }
@@ -64,6 +68,9 @@ class ArmCalls:
     bias: ArrayCall
     inverse_dynamics: ArrayCall
     forward_dynamics: ArrayCall
+    regressor: ArrayCall
+    inverse_dynamics_derivatives: ArrayCall
+    forward_dynamics_derivatives: ArrayCall
     ik: PoseCallLike
 
     def __init__(self, description: Description) -> None:

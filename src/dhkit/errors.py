@@ -6,7 +6,23 @@ from typing import Any
 
 
 def from_checkout(extra: str) -> str:
-    """Return the command that installs one of dhkit's extras; the distribution is not published yet."""
+    """Return the command that installs one of dhkit's extras; the distribution is not published yet.
+
+    Parameters
+    ----------
+    extra
+        Name of an extra in pyproject.toml, such as ``report``.
+
+    Returns
+    -------
+    str
+        A command line.
+
+    Examples
+    --------
+    >>> from_checkout("report")
+    "`.venv/bin/pip install -e '.[report]'` in dhkit's checkout"
+    """
     return f"`.venv/bin/pip install -e '.[{extra}]'` in dhkit's checkout"
 
 

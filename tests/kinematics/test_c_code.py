@@ -9,6 +9,7 @@ import pytest
 from acceptance import slow_if
 from conftest import require
 from dhkit import Arm
+from dhkit.kinematics.solutions import IKFlag, IKStatus
 from random_arms import states
 
 STRICT = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", "-shared", "-fPIC"]
@@ -62,6 +63,25 @@ def test_c_computes_the_same(name, tmp_path):
             assert np.array_equal(valid.astype(bool), ours.valid)
             assert np.array_equal(flags, ours.flags)
             assert np.nanmax(np.abs(np.angle(np.exp(1j * (found - ours.q))))) < 1e-9
+
+
+def test_the_header_explains_flags_and_status(tmp_path):
+    """The numbers are those of IKFlag and IKStatus, all that a closed form returns."""
+    _, header = Arm.load("puma560").export_c(tmp_path)
+    text = header.read_text()
+    assert " *    1 singular: reached, and a branch is at a singularity: see flags\n" in text
+    for number in (
+        IKFlag.shoulder,
+        IKFlag.elbow,
+        IKFlag.wrist,
+        IKFlag.clamped,
+        IKFlag.out_of_limits,
+    ):
+        assert f" *   {number.value:2} {number.name}: " in text
+    for status in IKStatus:
+        explained = f" *   {status.value:2} {status.name}: " in text
+        assert explained == (status is not IKStatus.not_found)
+    assert "the second that of joint 4 where two axes of the wrist" in text
 
 
 def test_a_name_that_is_no_identifier_is_refused(tmp_path):

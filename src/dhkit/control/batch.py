@@ -82,6 +82,16 @@ def simulate_batch(
         A link without a body.
     ValueError, TypeError
         An argument that does not fit: says which, and what is expected.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> released = np.zeros((5, 2))
+    >>> result = simulate_batch(arm, None, q0=released, duration=0.1, friction=False)
+    >>> result.q.shape
+    (5, 2)
     """
     chosen = BatchOptions.of(options, keywords)
     friction = Friction.chosen(chosen.friction)

@@ -63,10 +63,21 @@ def make_controller(
     q
         Joint values at which an LQR is linearized, shape (n,), rad and m; zero unless given.
 
+    Returns
+    -------
+    Controller
+        A new controller with gains for the bandwidth.
+
     Raises
     ------
     ValueError
         No such controller.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> make_controller("computed-torque", library_robot("planar2r"), bandwidth=10.0)
+    <ComputedTorque of planar2r: kp 100, kd 20>
     """
     _require_known(name)
     return CONTROLLERS[name](
@@ -221,10 +232,24 @@ def compare(
     duration, q0, qd0, options, **keywords
         As for :func:`simulate`.
 
+    Returns
+    -------
+    Comparison
+        The runs by name, and the messages of those that failed.
+
     Raises
     ------
     ValueError
         No such controller.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.trajectories import quintic
+    >>> arm = library_robot("planar2r")
+    >>> runs = compare(arm, quintic(arm, [0, 0], [0.5, 1.0], duration=1.0), ["pd-gravity", "computed-torque"])
+    >>> list(runs.results)
+    ['pd-gravity', 'computed-torque']
     """
     checked = SimulationOptions.of(options, keywords)
     chosen: Mapping[str, Any]

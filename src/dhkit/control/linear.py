@@ -50,6 +50,13 @@ def linearize(
         A state that is not (n,) and finite.
     DescriptionError
         A link without a body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> A, B = linearize(library_robot("planar2r"), [-1.5707963267948966, 0.0])  # hanging
+    >>> A.shape, B.shape
+    ((4, 4), (4, 2))
     """
     require_inertia(description)
     n = description.n

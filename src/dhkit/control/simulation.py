@@ -85,6 +85,16 @@ def simulate(
         A link without a body.
     ValueError, TypeError
         An argument that does not fit: says which, and what is expected.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.control import PID
+    >>> from dhkit.trajectories import quintic
+    >>> arm = library_robot("planar2r")
+    >>> run = simulate(arm, PID.tuned(arm), quintic(arm, [0, 0], [0.5, 1.0], duration=1.0))
+    >>> run.q.shape
+    (1001, 2)
     """
     chosen = SimulationOptions.of(options, keywords)
     require_fits(controller, description)

@@ -23,6 +23,11 @@ def asset(name: str) -> Path:
     name
         Path below the package's folder of assets.
 
+    Returns
+    -------
+    Path
+        Path of the file in the installed package, or in the checkout.
+
     Raises
     ------
     DescriptionError

@@ -51,6 +51,23 @@ def with_tool(description: Description, T: ArrayLike) -> Description:
         The arm.
     T
         Pose of the tool in DH frame n, shape (4, 4), m.
+
+    Returns
+    -------
+    Description
+        The arm with this tool; bodies stay as they are.
+
+    Raises
+    ------
+    ValueError
+        T is not one pose, shape (4, 4).
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, pose, world_to_tool
+    >>> arm = with_tool(library_robot("planar2r"), pose((0.1, 0, 0)))
+    >>> world_to_tool(arm, [0, 0])[:3, 3].round(3)
+    array([1., 0., 0.])
     """
     return replace(description, tool=Tool(placement_of_pose(T, "tool"), description.tool.shapes))
 
@@ -65,6 +82,25 @@ def with_base(description: Description, T: ArrayLike) -> Description:
         The arm.
     T
         Pose of frame 0 in the world, shape (4, 4), m.
+
+    Returns
+    -------
+    Description
+        The same arm elsewhere; gravity stays as it is in the world.
+
+    Raises
+    ------
+    ValueError
+        T is not one pose, shape (4, 4).
+    DescriptionError
+        Values that make no robot.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, pose, world_to_tool
+    >>> arm = with_base(library_robot("planar2r"), pose((0, 0, 1)))
+    >>> world_to_tool(arm, [0, 0])[:3, 3]
+    array([0.9, 0. , 1. ])
     """
     base = description.base
     return replace(description, base=Base(placement_of_pose(T, "base"), base.shapes, base.body))
@@ -80,6 +116,11 @@ def with_parameters(description: Description, /, **values: Quantity) -> Descript
         The arm.
     **values
         Values by name; text may name other parameters.
+
+    Returns
+    -------
+    Description
+        The arm with these values; what depends on them changes with them.
 
     Raises
     ------
@@ -115,11 +156,18 @@ def with_limits(
 
     Parameters
     ----------
+    description
+        The arm.
     lower, upper
         Lowest and highest joint values, rad and m, one number for all joints or shape (n,). Infinite on both sides:
         the joint is unlimited.
     velocity, torque
         Largest speeds, rad/s and m/s, and torques or forces, N m and N, likewise; inf: unlimited.
+
+    Returns
+    -------
+    Description
+        The arm with the new limits.
 
     Raises
     ------
@@ -127,6 +175,13 @@ def with_limits(
         A lower limit above the upper one, one side infinite, NaN, or a speed or torque that is not positive.
     ValueError
         Another shape.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = with_limits(library_robot("planar2r"), velocity=2.0, torque=[30, 10])
+    >>> arm.numbers.velocity, arm.numbers.effort
+    (array([2., 2.]), array([30., 10.]))
     """
     numbers = description.numbers
     n = description.n
@@ -169,6 +224,8 @@ def with_payload(
 
     Parameters
     ----------
+    description
+        The arm.
     mass
         kg; text may use the description's parameters.
     com
@@ -176,10 +233,22 @@ def with_payload(
     inertia
         Tensor about the load's centre of mass in the tool's axes, shape (3, 3), kg m^2; a point mass if not given.
 
+    Returns
+    -------
+    Description
+        The arm with the load.
+
     Raises
     ------
     DescriptionError
         The last link has no body to join it to, or the load is an impossible body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = with_payload(library_robot("planar2r"), 1.5, com=(0.05, 0, 0))
+    >>> [body.name for body in arm.joints[-1].bodies]
+    ['body 1', 'payload']
     """
     last = description.joints[-1]
     if not last.bodies:
@@ -213,13 +282,27 @@ def with_uniform_links(
 
     Parameters
     ----------
+    description
+        The arm.
     masses
         One a link, kg; 1 kg each if not given.
+
+    Returns
+    -------
+    Description
+        The arm with one body a link; earlier bodies are replaced.
 
     Raises
     ------
     DescriptionError
         Another number of masses, or ``m1`` ... is a parameter with a meaning of its own.
+
+    Examples
+    --------
+    >>> from dhkit.description import from_dh
+    >>> arm = with_uniform_links(from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)]), masses=[2.0, 1.0])
+    >>> arm.numbers.com.tolist()
+    [[-0.25, 0.0, 0.0], [-0.2, 0.0, 0.0]]
     """
     n = description.n
     if masses is not None and len(masses) != n:

@@ -89,6 +89,13 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     ------
     OSError
         It cannot be written; names the file or its folder.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> write_atomically("results/note.txt", "done")
+    >>> Path("results/note.txt").read_text()
+    'done'
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content

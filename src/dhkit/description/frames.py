@@ -29,6 +29,8 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
 
     Parameters
     ----------
+    description
+        The arm.
     q
         Joint values, shape (..., n), rad and m, or names.
     name
@@ -45,6 +47,15 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
         Another last axis than n, or no configuration of that name.
     TypeError
         Not numbers.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("puma560")
+    >>> joint_array(arm, "ready").round(4)
+    array([ 0.    ,  1.5708, -1.5708,  0.    ,  0.    ,  0.    ])
+    >>> joint_array(arm, ["zero", "ready"]).shape
+    (2, 6)
     """
     if type(q) is not np.ndarray:
         if isinstance(q, str) and not name.startswith(_RATE_NAMES):
@@ -91,12 +102,27 @@ def joint_vector(description: Description, q: ArrayLike, name: str = "q") -> Arr
     name
         Name of the argument in messages.
 
+    Returns
+    -------
+    Array
+        Shape (n,), rad and m.
+
     Raises
     ------
     ValueError
         Another shape, or a value that is not finite.
     TypeError
         Not numbers.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> joint_vector(library_robot("planar2r"), [0.1, 0.2])
+    array([0.1, 0.2])
+    >>> joint_vector(library_robot("planar2r"), [0.1, 0.2, 0.3])
+    Traceback (most recent call last):
+        ...
+    ValueError: q has shape (3,); expected (..., 2) for planar2r
     """
     vector = joint_array(description, q, name)
     if vector.shape != (description.n,):
@@ -133,6 +159,8 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
 
     Parameters
     ----------
+    description
+        The arm.
     q
         Joint values, shape (..., n), rad and m.
 
@@ -140,6 +168,20 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     -------
     Array
         Shape (..., n, 4, 4): A_i maps coordinates in frame i to frame i - 1, m. NaN rows where q is not finite.
+
+    Raises
+    ------
+    ValueError, TypeError
+        q has not shape (..., n), or is not numeric.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> A = link_transforms(library_robot("planar2r"), [0.0, 0.0])
+    >>> A.shape
+    (2, 4, 4)
+    >>> A[0][:3, 3]  # the origin of frame 1 in frame 0, m
+    array([0.5, 0. , 0. ])
     """
     numbers = description.numbers
     q = joint_array(description, q)
@@ -205,8 +247,27 @@ def world_to_frames(description: Description, q: ArrayLike) -> Array:
 
     Parameters
     ----------
+    description
+        The arm.
     q
         Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    Array
+        Shape (..., n+1, 4, 4), m; NaN where q is not finite.
+
+    Raises
+    ------
+    ValueError, TypeError
+        q has not shape (..., n), or is not numeric.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> T = world_to_frames(library_robot("planar2r"), [0.0, 0.0])
+    >>> T[:, 0, 3]  # x of the frames' origins, m
+    array([0. , 0.5, 0.9])
     """
     # T_0 = base,  T_i = T_(i-1) A_i
     A = link_transforms(description, q)
@@ -224,8 +285,26 @@ def world_to_tool(description: Description, q: ArrayLike) -> Array:
 
     Parameters
     ----------
+    description
+        The arm.
     q
         Joint values, shape (..., n), rad and m.
+
+    Returns
+    -------
+    Array
+        Shape (..., 4, 4), m; NaN where q is not finite.
+
+    Raises
+    ------
+    ValueError, TypeError
+        q has not shape (..., n), or is not numeric.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> world_to_tool(library_robot("planar2r"), [0.0, 0.0])[:3, 3]
+    array([0.9, 0. , 0. ])
     """
     return world_to_frames(description, q)[..., -1, :, :] @ description.numbers.T_last_tool
 

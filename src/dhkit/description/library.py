@@ -18,6 +18,11 @@ FOLDER = resources.files("dhkit.description") / "library"
 def robots() -> tuple[str, ...]:
     """Return the names of the library's robots, sorted.
 
+    Returns
+    -------
+    tuple[str, ...]
+        Names that :func:`library_robot` and ``Arm.load`` accept.
+
     Examples
     --------
     >>> "puma560" in robots()
@@ -35,6 +40,11 @@ def library_robot(name: str) -> Description:
     ----------
     name
         Name, one of :func:`robots`.
+
+    Returns
+    -------
+    Description
+        The robot.
 
     Raises
     ------

@@ -103,13 +103,28 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
 
     Parameters
     ----------
+    description
+        The arm.
     joints
         The value at which each joint is locked, rad or m, by the joint's place from 0 or by its name.
+
+    Returns
+    -------
+    Description
+        An arm of fewer joints, whose poses and torques are those of the arm with these joints held.
 
     Raises
     ------
     DescriptionError
         No such joint, one named twice, or none left to move.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("puma560")
+    >>> wrist = lock(arm, {0: 0.0, 1: 0.0, "elbow": 0.0})
+    >>> wrist.n, [joint.name for joint in wrist.joints]
+    (3, ['wrist_roll', 'wrist_pitch', 'flange_roll'])
     """
     locked = _locked_places(description, joints)
     if len(locked) == description.n:

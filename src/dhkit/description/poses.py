@@ -114,6 +114,11 @@ def pose_quaternion(T: ArrayLike) -> Array:
     T
         Poses, shape (..., 4, 4), m.
 
+    Returns
+    -------
+    Array
+        Shape (..., 4): x, y, z, w, of unit length, w >= 0.
+
     Raises
     ------
     ValueError
@@ -140,6 +145,11 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
         Poses, shape (..., 4, 4), m.
     name
         Name of the argument in messages.
+
+    Returns
+    -------
+    Array
+        T as float64, shape (..., 4, 4), m.
 
     Raises
     ------

@@ -115,7 +115,27 @@ class Description(RobotData):
 def takes_robot(
     function: Callable[Concatenate[Description, P], R],
 ) -> Callable[Concatenate[Robot, P], R]:
-    """Return a function of a description that takes an arm as well, as first argument or as ``description=``."""
+    """Return a function of a description that takes an arm as well, as first argument or as ``description=``.
+
+    Parameters
+    ----------
+    function
+        Function whose first parameter is ``description``.
+
+    Returns
+    -------
+    Callable
+        The same function for a description or an arm.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> @takes_robot
+    ... def joint_count(description):
+    ...     return description.n
+    >>> joint_count(Arm.load("planar2r"))
+    2
+    """
 
     @wraps(function)
     def wrapper(*arguments: Any, **options: Any) -> R:
@@ -138,10 +158,21 @@ def description_of(robot: Robot) -> Description:
     robot
         Description, or an arm.
 
+    Returns
+    -------
+    Description
+        The robot as data; the argument itself if it is a description.
+
     Raises
     ------
     TypeError
         Neither.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> description_of(Arm.load("planar2r")).name
+    'planar2r'
     """
     return cast("Description", data_of(robot))
 
@@ -150,10 +181,26 @@ def description_of(robot: Robot) -> Description:
 def require_bodies(description: Description) -> tuple[tuple[Body, ...], ...]:
     """Return the bodies of each link, and refuse an arm whose dynamics are unknown.
 
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    tuple[tuple[Body, ...], ...]
+        For each link its bodies, at least one.
+
     Raises
     ------
     DescriptionError
         Names the joints whose links have no body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> [len(bodies) for bodies in require_bodies(library_robot("planar2r"))]
+    [1, 1]
     """
     bare = [
         f"{i} ({joint.name})"

@@ -58,10 +58,22 @@ def read_robot(path: str | Path) -> Description:
     path
         Robot file, which ends in ``.toml``.
 
+    Returns
+    -------
+    Description
+        The robot.
+
     Raises
     ------
     DescriptionError
         It cannot be read, or describes no robot: file, joint, key, the value found and the value expected.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, write_robot
+    >>> write_robot(library_robot("planar2r"), "arm.toml")
+    >>> read_robot("arm.toml") == library_robot("planar2r")
+    True
     """
     path = Path(path)
     content = read_bounded(path, BOUNDS.file_bytes)
@@ -85,6 +97,11 @@ def from_toml(
         Name of the file in messages.
     mesh_folder
         Folder that mesh paths are relative to.
+
+    Returns
+    -------
+    Description
+        The robot.
 
     Raises
     ------
@@ -116,6 +133,24 @@ def to_toml(description: Description) -> str:
     """Return a description as a robot file's text.
 
     Reading it gives an equal description in the same units. Comments of a file that was read are not kept.
+
+    Parameters
+    ----------
+    description
+        The arm.
+
+    Returns
+    -------
+    str
+        TOML text that :func:`from_toml` reads.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> print(to_toml(library_robot("planar2r"))[:30])
+    format = 1
+    name = "planar2r"
+    c
     """
     return toml_text(description)
 
@@ -130,6 +165,18 @@ def write_robot(description: Description, path: str | Path) -> None:
         The arm.
     path
         File to write.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; names the file or its folder.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, read_robot
+    >>> write_robot(library_robot("planar2r"), "mine.toml")
+    >>> read_robot("mine.toml").name
+    'planar2r'
     """
     write_atomically(Path(path), toml_text(description))
 

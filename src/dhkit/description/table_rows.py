@@ -80,6 +80,11 @@ def from_dh(
         Of each link: a :class:`Body`, or ``{"mass": 2.0, "com": (x, y, z), "inertia": ((…), (…), (…))}`` in kg, m and
         kg m^2, about the centre of mass in the axes of the link's own DH frame; or None.
 
+    Returns
+    -------
+    Description
+        The arm; without bodies its kinematics work and its dynamics say what is missing.
+
     Raises
     ------
     DescriptionError

@@ -1,5 +1,11 @@
 """Dynamics of an arm: inverse and forward dynamics, their terms, energies and friction, on batches."""
 
+from dhkit.dynamics.derivatives import (
+    ForwardDynamicsDerivatives,
+    InverseDynamicsDerivatives,
+    forward_dynamics_derivatives,
+    inverse_dynamics_derivatives,
+)
 from dhkit.dynamics.energy import kinetic_energy, potential_energy, power
 from dhkit.dynamics.equations import (
     bias,
@@ -20,17 +26,21 @@ from dhkit.dynamics.velocity_regressor import (
 from dhkit.symbolic import Friction
 
 __all__ = [
+    "ForwardDynamicsDerivatives",
     "Friction",
+    "InverseDynamicsDerivatives",
     "ParameterGrouping",
     "bias",
     "coriolis_matrix",
     "dynamic_kernels",
     "dynamics_graph",
     "forward_dynamics",
+    "forward_dynamics_derivatives",
     "friction_torque",
     "gravity_torque",
     "inertial_parameters",
     "inverse_dynamics",
+    "inverse_dynamics_derivatives",
     "kinetic_energy",
     "mass_matrix",
     "parameter_grouping",

@@ -38,6 +38,12 @@ def kinetic_energy(
     ------
     DescriptionError, ValueError, TypeError
         As for :func:`dhkit.dynamics.mass_matrix`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> round(float(kinetic_energy(library_robot("planar2r"), [0.0, 0.0], [1.0, 0.0])), 4)
+    0.4608
     """
     return evaluate("kinetic_energy", description, {"q": q, "qd": qd}, (), out, threads)
 
@@ -66,6 +72,11 @@ def potential_energy(
     Array
         Shape (...), J.
 
+    Raises
+    ------
+    DescriptionError, ValueError, TypeError
+        As for :func:`dhkit.dynamics.mass_matrix`.
+
     Examples
     --------
     >>> from dhkit.description import library_robot
@@ -90,6 +101,11 @@ def power(
         Joint rates and torques, shape (..., n), rad/s, m/s, N m and N.
     out
         Array that receives the result, float64, C-contiguous; a new array unless given.
+
+    Returns
+    -------
+    Array
+        Shape (...), W; positive where the drives do work on the arm.
 
     Raises
     ------

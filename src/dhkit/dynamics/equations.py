@@ -39,6 +39,13 @@ def mass_matrix(
         A link without a body.
     ValueError, TypeError
         q has not shape (..., n) or is not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> mass_matrix(library_robot("planar2r"), [0.0, 0.0]).round(4)
+    array([[0.9217, 0.23  ],
+           [0.23  , 0.08  ]])
     """
     return evaluate(
         "mass_matrix", description, {"q": q}, (description.n, description.n), out, threads
@@ -62,10 +69,22 @@ def coriolis_matrix(
     qd
         Joint rates, shape (..., n), rad/s and m/s; batch axes broadcast.
 
+    Returns
+    -------
+    Array
+        Shape (..., n, n), kg m^2/s, kg m/s and kg/s; NaN where an input is not finite.
+
     Raises
     ------
     DescriptionError, ValueError, TypeError
         As for :func:`mass_matrix`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> coriolis_matrix(library_robot("planar2r"), [0.0, 0.5], [1.0, 2.0]).round(4)
+    array([[-0.1438, -0.2157],
+           [ 0.0719,  0.    ]])
     """
     tail = (description.n, description.n)
     return evaluate("coriolis_matrix", description, {"q": q, "qd": qd}, tail, out, threads)
@@ -92,6 +111,11 @@ def gravity_torque(
     -------
     Array
         Shape (..., n), N m and N.
+
+    Raises
+    ------
+    DescriptionError, ValueError, TypeError
+        As for :func:`mass_matrix`.
 
     Examples
     --------
@@ -128,6 +152,11 @@ def bias(
     -------
     Array
         Shape (..., n), N m and N.
+
+    Raises
+    ------
+    DescriptionError, ValueError, TypeError
+        As for :func:`mass_matrix`.
 
     Examples
     --------
@@ -178,6 +207,13 @@ def inverse_dynamics(
         A link without a body.
     ValueError, TypeError
         An argument of another shape, or not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> inverse_dynamics(arm, [0.0, 0.0], [1.0, 0.0], [0.0, 2.0]).round(3)
+    array([15.666,  3.103])
     """
     # M qdd + h = tau + load  with  load = J^T wrench - friction,  so  tau = (M qdd + h) - load.
     load = external_torque(description, q, qd, wrench, friction, threads)

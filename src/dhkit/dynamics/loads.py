@@ -51,6 +51,12 @@ def friction_torque(
     ------
     ValueError, TypeError
         qd has not shape (..., n) or is not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> friction_torque(library_robot("puma560"), [0.5, 0, 0, 0, 0, -0.5]).round(2)
+    array([27.63,  0.  ,  0.  ,  0.  ,  0.  , -0.91])
     """
     state = joint_array(description, qd, "qd")
     width = Friction().width if friction is None else friction.width
@@ -82,10 +88,21 @@ def wrench_torque(
     threads
         As for :func:`dhkit.dynamics.mass_matrix`.
 
+    Returns
+    -------
+    Array
+        Shape (..., n), J^T wrench, N m and N; NaN where an input is not finite.
+
     Raises
     ------
     ValueError, TypeError
         An argument of another shape, or not numeric.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> wrench_torque(library_robot("planar2r"), [0.0, 0.0], [0, 10, 0, 0, 0, 0]).round(3)  # 10 N upwards at the tip
+    array([9., 4.])
     """
     load = number_array(wrench, "wrench", "(..., 6)")
     if load.ndim == 0 or load.shape[-1] != 6:

@@ -22,8 +22,10 @@ from dhkit.symbolic import (
     potential_energy,
     recursive_bias,
     recursive_forward_dynamics,
+    recursive_forward_dynamics_derivatives,
     recursive_gravity,
     recursive_inverse_dynamics,
+    recursive_inverse_dynamics_derivatives,
 )
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ _EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "bias": recursive_bias,
     "inverse_dynamics": recursive_inverse_dynamics,
     "forward_dynamics": recursive_forward_dynamics,
+    "inverse_dynamics_derivatives": recursive_inverse_dynamics_derivatives,
+    "forward_dynamics_derivatives": recursive_forward_dynamics_derivatives,
     "kinetic_energy": kinetic_energy,
     "potential_energy": potential_energy,
 }
@@ -47,6 +51,8 @@ _STATES: Mapping[str, tuple[str, ...]] = {
     "bias": ("q", "qd"),
     "inverse_dynamics": ("q", "qd", "qdd"),
     "forward_dynamics": ("q", "qd", "tau"),
+    "inverse_dynamics_derivatives": ("q", "qd", "qdd"),
+    "forward_dynamics_derivatives": ("q", "qd", "tau"),
     "kinetic_energy": ("q", "qd"),
     "potential_energy": ("q",),
 }
@@ -99,6 +105,25 @@ def dynamics_graph(quantity: str, description: Description) -> Graph:
         The robot, with a body on every link.
     quantity
         Name of the quantity, such as ``"inverse_dynamics"``.
+
+    Returns
+    -------
+    Graph
+        Inputs ``parameters`` (see :func:`dhkit.symbolic.inertial_pattern`) and the states, output ``result``.
+
+    Raises
+    ------
+    KeyError
+        No such quantity.
+    DescriptionError
+        A link without a body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> graph = dynamics_graph("gravity_torque", library_robot("planar2r"))
+    >>> [variable.name for variable in graph.inputs]
+    ['parameters', 'q']
     """
     table, parameters = InertialTable.parametric(description)
     symbols = {name: joint_symbols(name, description.n) for name in _STATES[quantity]}
@@ -108,7 +133,24 @@ def dynamics_graph(quantity: str, description: Description) -> Graph:
 
 @takes_robot
 def dynamic_kernels(description: Description) -> list[Kernel]:
-    """Return the kernels of friction and wrenches and, for an arm with bodies, of its equation of motion."""
+    """Return the kernels of friction and wrenches and, for an arm with bodies, of its equation of motion.
+
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    list[Kernel]
+        The kernels that ``arm.compile`` compiles: of friction and wrenches alone where a link has no body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> len(dynamic_kernels(library_robot("planar2r")))
+    11
+    """
     kernels = [friction_kernel(description.n, smooth) for smooth in (False, True)]
     kernels.append(wrench_kernel(description)[0])
     if all(joint.bodies for joint in description.joints):

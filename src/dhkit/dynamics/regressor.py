@@ -2,25 +2,56 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import INERTIA_PLACES, Array, Description, joint_array, takes_robot
-from dhkit.description.frames import carrying, world_to_frames
+from dhkit.description import Array, Description, joint_array, takes_robot
+from dhkit.kernels import Kernel, fill, kernel
+from dhkit.symbolic import (
+    Graph,
+    SymbolicTable,
+    joint_symbols,
+    table_pattern,
+    velocity_regressor,
+)
 
 
 @takes_robot
 def inertial_parameters(description: Description) -> Array:
-    """Return the links' inertial parameters, shape (10 n,), that :func:`regressor` is to be multiplied by.
+    """Return the links' inertial parameters, that :func:`regressor` is to be multiplied by.
 
-    Ten for each link: mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz about its DH frame's
-    origin, kg m^2, in the axes of that frame: m2, rx2, ry2, rz2, Ixx2, Iyy2, Izz2, Ixy2, Iyz2, Ixz2.
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    Array
+        Shape (10 n,), ten for each link: mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz
+        about its DH frame's origin, kg m^2, in the axes of that frame: m2, rx2, ry2, rz2, Ixx2, Iyy2, Izz2, Ixy2, Iyz2,
+        Ixz2. NaN where a link has no body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> inertial_parameters(library_robot("planar2r"))[:4].round(3)  # m1, rx1, ry1, rz1
+    array([ 2. , -0.5,  0. ,  0. ])
     """
     return description.numbers.inertial_parameters.ravel()
 
 
 @takes_robot
-def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+def regressor(
+    description: Description,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
     """Return Y with tau = Y theta + B qdd, B ``numbers.drive_inertia``, theta of :func:`inertial_parameters`.
 
     The force and moment that a link needs are linear in its parameters (Atkeson, An & Hollerbach, 1986, eq. 8); the
@@ -32,6 +63,10 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
         The robot; its links' bodies do not matter.
     q, qd, qdd
         Joint values, rates and accelerations, shapes (..., n), rad, m and seconds; batch axes broadcast.
+    out
+        Array that receives the result, shape (..., n, 10 n), float64, C-contiguous.
+    threads
+        Number of threads that share a large batch.
 
     Returns
     -------
@@ -41,92 +76,45 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
     Raises
     ------
     ValueError, TypeError
-        An argument of another shape, or not numeric.
+        An argument of another shape, or not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> Y = regressor(arm, [0.3, -0.5], [1.0, 0.2], [0.5, -1.0])
+    >>> (Y @ inertial_parameters(arm)).round(4)  # without drives, these are the torques
+    array([14.8616,  2.8382])
     """
-    n = description.n
-    prismatic = description.numbers.prismatic
-    q, qd, qdd = np.broadcast_arrays(
-        joint_array(description, q, "q"),
-        joint_array(description, qd, "qd"),
-        joint_array(description, qdd, "qdd"),
-    )
-    frames = np.moveaxis(world_to_frames(description, q), -3, 0)
-    origins = frames[..., :3, 3]
-    # The frames whose z axis and origin lie on the joints' axes.
-    carriers = carrying(description.convention, frames)
-
-    # Everything is in world axes. Gravity acts like an acceleration of the base upwards.
-    w, wd = np.zeros((2, *q.shape[:-1], 3))
-    a = np.broadcast_to(-description.numbers.gravity, w.shape)
-    Y = np.zeros((*q.shape, 10 * n))
-    for i in range(n):
-        z = carriers[i][..., :3, 2]
-        on_axis = carriers[i][..., :3, 3]
-        v = qd[..., i, None]
-        vd = qdd[..., i, None]
-        if prismatic[i]:
-            # a_i = a_(i-1) + wd x r + w x (w x r) + 2 w x z qd + z qdd
-            lever = origins[i + 1] - origins[i]
-            a = a + _relative_acceleration(w, wd, lever) + 2 * v * np.cross(w, z) + vd * z
-        else:
-            # To a point on the axis with the link before, then on to the origin with the link itself:
-            # wd_i = wd_(i-1) + z qdd + w_(i-1) x z qd,  w_i = w_(i-1) + z qd
-            a = a + _relative_acceleration(w, wd, on_axis - origins[i])
-            wd = wd + vd * z + v * np.cross(w, z)
-            w = w + v * z
-            a = a + _relative_acceleration(w, wd, origins[i + 1] - on_axis)
-
-        # The torque at joint j is the component along its axis of the force, or of the moment about a point on it.
-        force, moment = _force_and_moment(frames[i + 1][..., :3, :3], w, wd, a)
-        for j in range(i + 1):
-            z = carriers[j][..., :3, 2]
-            effort = force
-            if not prismatic[j]:
-                lever = origins[i + 1] - carriers[j][..., :3, 3]
-                effort = moment + np.cross(lever[..., None], force, axisa=-2, axisb=-2, axisc=-2)
-            Y[..., j, 10 * i : 10 * i + 10] = np.einsum("...k,...kp->...p", z, effort)
-    Y[~np.isfinite(q + qd + qdd).all(axis=-1)] = np.nan
-    return Y
+    named = ((q, "q"), (qd, "qd"), (qdd, "qdd"))
+    states = [joint_array(description, x, name) for x, name in named]
+    run, parameters = regressor_kernel(description)
+    return fill(run, parameters, states, (description.n, 10 * description.n), out, threads)
 
 
-def _relative_acceleration(w: Array, wd: Array, r: Array) -> Array:
-    """Return the acceleration of a point at r from another point of a link: wd x r + w x (w x r)."""
-    return np.cross(wd, r) + np.cross(w, np.cross(w, r))
+@lru_cache(maxsize=512)
+def regressor_kernel(description: Description) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`regressor` and the arm's values of its parameters, of which gravity is the last."""
+    pattern, parameters = table_pattern(description)
+    gravity = gravity_in_base(description)
+    run = kernel("regressor", pattern, lambda: _graph(description))
+    return run, np.concatenate([parameters, gravity])
 
 
-def _force_and_moment(R: Array, w: Array, wd: Array, a: Array) -> tuple[Array, Array]:
-    """Return a link's force and moment about its frame's origin, world axes, as matrices (..., 3, 10).
+def _graph(description: Description) -> Graph:
+    import casadi
 
-    They are multiplied by mass, first moments and second moments in the link's axes, whose rotation is R.
-    """
-    # R^T: in the axes of the link.
-    w = np.einsum("...ji,...j->...i", R, w)
-    wd = np.einsum("...ji,...j->...i", R, wd)
-    a = np.einsum("...ji,...j->...i", R, a)
-
-    # Force m a + ([wd]x + [w]x [w]x) m c, moment -[a]x m c + I wd + [w]x I w
-    force, moment = np.zeros((2, *w.shape, 10))
-    W = _cross_matrix(w)
-    force[..., :, 0] = a
-    force[..., :, 1:4] = _cross_matrix(wd) + W @ W
-    moment[..., :, 1:4] = -_cross_matrix(a)
-    moment[..., :, 4:] = _tensor_times(wd) + W @ _tensor_times(w)
-    return R @ force, R @ moment
+    table, parameters = SymbolicTable.parametric(description)
+    gravity = joint_symbols("gravity", 3)
+    q, qd, qdd = (joint_symbols(name, description.n) for name in ("q", "qd", "qdd"))
+    # The regressor of M qdd_r + C qd_r + g is that of inverse dynamics where the reference is the motion itself.
+    Y = velocity_regressor(table, (gravity[0], gravity[1], gravity[2]), q, qd, qd, qdd)
+    parameters = casadi.vertcat(parameters, gravity)
+    return Graph.of("regressor", {"parameters": parameters, "q": q, "qd": qd, "qdd": qdd}, {"Y": Y})
 
 
-def _tensor_times(w: Array) -> Array:
-    """Return the matrix (..., 3, 6) that takes second moments to I w."""
-    matrix = np.zeros((*w.shape, 6))
-    for k, (i, j) in enumerate(INERTIA_PLACES.values()):
-        matrix[..., i, k] = w[..., j]
-        matrix[..., j, k] = w[..., i]
-    return matrix
-
-
-def _cross_matrix(w: Array) -> Array:
-    """Return [w]x, shape (..., 3, 3)."""
-    matrix = np.zeros((*w.shape, 3))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        matrix[..., j, i] = w[..., k]
-        matrix[..., i, j] = -w[..., k]
-    return matrix
+def gravity_in_base(description: Description) -> Array:
+    """Return the free-fall acceleration in the axes of frame 0, shape (3,), m/s^2."""
+    numbers = description.numbers
+    gravity: Array = numbers.T_world_base[:3, :3].T @ numbers.gravity
+    return gravity

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
-from dhkit.dynamics.regressor import regressor
+from dhkit.dynamics.regressor import gravity_in_base, regressor
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import (
     Graph,
@@ -65,6 +65,13 @@ def velocity_regressor(
     ------
     ValueError, TypeError
         An argument of another shape, or not numeric; ``out`` does not fit.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> arm = library_robot("planar2r")
+    >>> velocity_regressor(arm, [0.3, -0.5], [1.0, 0.2], [0.9, 0.1], [0.0, 0.0]).shape
+    (2, 20)
     """
     named = ((q, "q"), (qd, "qd"), (qd_r, "qd_r"), (qdd_r, "qdd_r"))
     states = [joint_array(description, x, name) for x, name in named]
@@ -76,10 +83,8 @@ def velocity_regressor(
 def _velocity_regressor_kernel(description: Description) -> tuple[Kernel, Array]:
     """Return the kernel of :func:`velocity_regressor` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
-    numbers = description.numbers
-    gravity = numbers.T_world_base[:3, :3].T @ numbers.gravity
     run = kernel("velocity_regressor", pattern, lambda: _graph(description))
-    return run, np.concatenate([parameters, gravity])
+    return run, np.concatenate([parameters, gravity_in_base(description)])
 
 
 def _graph(description: Description) -> Graph:
@@ -128,6 +133,16 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
     Columns are taken one after the other, and kept where they do not depend on those before (Gautier 1991, Numerical
     calculation of the base inertial parameters of robots): moments first, from the last link to the first, then masses.
     So a mass is grouped with moments, and what may belong to two links with that nearer to the base.
+
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    ParameterGrouping
+        Base parameters in numbers, without those of the drives; in symbols: :func:`dhkit.symbolic.base_parameters`.
 
     Examples
     --------

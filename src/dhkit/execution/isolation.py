@@ -87,6 +87,11 @@ def find_isolation(
     required
         Whether programs of others are to be run, which must be isolated.
 
+    Returns
+    -------
+    Isolation
+        How programs are run; false in a condition where they are not isolated.
+
     Raises
     ------
     IsolationError

@@ -26,6 +26,22 @@ def sqrt(x: Expression) -> Expression:
     ----------
     x
         Exact value.
+
+    Returns
+    -------
+    Expression
+        The root, not negative; exact.
+
+    Raises
+    ------
+    ExpressionError
+        A negative number.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import exact
+    >>> print(sqrt(exact(4)).text, sqrt(exact(2)).text)
+    2 sqrt(2)
     """
     number = x.rational
     if number is None:
@@ -52,6 +68,17 @@ def sin(x: Expression) -> Expression:
     ----------
     x
         Exact value.
+
+    Returns
+    -------
+    Expression
+        Exact for multiples of 15 degrees, else an atom of exact arithmetic.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import parse
+    >>> print(sin(parse("pi/4", {})).text)
+    sqrt(2)/2
     """
     steps = _steps(x)
     if steps is not None:
@@ -68,6 +95,17 @@ def cos(x: Expression) -> Expression:
     ----------
     x
         Exact value.
+
+    Returns
+    -------
+    Expression
+        Exact for multiples of 15 degrees, else an atom of exact arithmetic.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import parse
+    >>> print(cos(parse("pi/3", {})).text)
+    0.5
     """
     steps = _steps(x)
     if steps is not None:
@@ -97,6 +135,17 @@ def arc_tangent(y: Expression, x: Expression) -> Expression:
     ----------
     y, x
         Exact values, in proportion to sine and cosine.
+
+    Returns
+    -------
+    Expression
+        rad, in (-pi, pi].
+
+    Examples
+    --------
+    >>> from dhkit.expressions import exact
+    >>> print(arc_tangent(exact(1), exact(-1)).text)
+    3*pi/4
     """
     if y.symbols or x.symbols:
         return Expression.of_atom(Atom("atan2", (y, x)))
@@ -145,10 +194,28 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., Expression]]] = {
 def call(function: str, *arguments: Expression) -> Expression:
     """Apply a function of :data:`FUNCTIONS`.
 
+    Parameters
+    ----------
+    function
+        Name, one of :data:`FUNCTIONS`.
+    *arguments
+        Exact values, as many as the function takes.
+
+    Returns
+    -------
+    Expression
+        The function's value, exact where it is rational or a root.
+
     Raises
     ------
     ExpressionError
         No such function, another number of arguments, or a value outside its domain.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import exact
+    >>> print(call("sqrt", exact(4)).text)
+    2
     """
     if function not in FUNCTIONS:
         raise ExpressionError(
@@ -171,6 +238,17 @@ def substitute(expression: Expression, values: Mapping[str, Expression]) -> Expr
         Expression.
     values
         Values by name.
+
+    Returns
+    -------
+    Expression
+        The value.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import exact, parse
+    >>> print(substitute(parse("l1 + l2", {"l1", "l2"}), {"l1": exact(0.5)}).text)
+    l2 + 0.5
     """
     if values.keys().isdisjoint(expression.symbols):
         return expression
@@ -198,7 +276,24 @@ def _decimal(atom: Atom) -> Expression:
 
 
 def decimals(expression: Expression) -> Expression:
-    """Return an expression with functions of numbers as decimals: 0.7648421872844885 for cos(0.7); roots stay."""
+    """Return an expression with functions of numbers as decimals: 0.7648421872844885 for cos(0.7); roots stay.
+
+    Parameters
+    ----------
+    expression
+        Exact value.
+
+    Returns
+    -------
+    Expression
+        The expression in which ``cos(0.7)`` and the like are decimals.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import parse
+    >>> print(decimals(parse("l1*cos(0.7)", {"l1"})).text)
+    0.7648421872844885*l1
+    """
     total = []
     for monomial, coefficient in expression.terms:
         product = Expression.number(coefficient)
@@ -300,6 +395,24 @@ def settled(value: Expression, *, angle: bool = False) -> Expression:
     """Return a value without parameters as a rational number or a multiple of pi; other values as they are.
 
     ``sin(0.5)`` is an atom of exact arithmetic; in a table it is written as 0.479425538604203.
+
+    Parameters
+    ----------
+    value
+        Exact value.
+    angle
+        Whether the value is an angle, which may be a multiple of pi.
+
+    Returns
+    -------
+    Expression
+        The value as it is written in a table.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import parse
+    >>> print(settled(parse("sin(0.5)", {}), angle=False).text)
+    0.479425538604203
     """
     if value.symbols or value.rational is not None or value.half_turns is not None:
         return value.with_digits(_SETTLED_DIGITS)

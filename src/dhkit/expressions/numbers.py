@@ -18,12 +18,22 @@ def exact(value: object) -> Expression:
     Parameters
     ----------
     value
-        Number or text.
+        Number; an expression is returned as it is.
+
+    Returns
+    -------
+    Expression
+        The exact value; an expression as it is.
 
     Raises
     ------
     ExpressionError
         The value is not a number, or not finite.
+
+    Examples
+    --------
+    >>> exact(0.1).rational
+    Fraction(1, 10)
     """
     if isinstance(value, Expression):
         return value
@@ -48,6 +58,22 @@ def exact_angle(value: Expression) -> Expression:
     """Return an angle, rad, in which a decimal that is the nearest double to k pi/12 is read as k pi/12.
 
     1.5707963267948966 is pi/2; all other decimals stay as they are.
+
+    Parameters
+    ----------
+    value
+        Angle, rad.
+
+    Returns
+    -------
+    Expression
+        The exact angle.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import exact
+    >>> print(exact_angle(exact(1.5707963267948966)).text)
+    pi/2
     """
     number = value.rational
     if not number:

@@ -35,6 +35,11 @@ def parse(text: str, names: Collection[str] = ()) -> Expression:
     names
         The parameters or variables that may occur.
 
+    Returns
+    -------
+    Expression
+        The value; parameters stay symbols.
+
     Raises
     ------
     ExpressionError

@@ -101,10 +101,20 @@ def read(text: str) -> Tree:
     text
         Formula, such as ``"l1 + 3*mm"``.
 
+    Returns
+    -------
+    Tree
+        The tree; nothing is evaluated.
+
     Raises
     ------
     ExpressionError
         The text is not an expression, or is longer or deeper than the limits of this module.
+
+    Examples
+    --------
+    >>> type(read("l1 + 3*mm")).__name__
+    'Sum'
     """
     if len(text) > BOUNDS.characters:
         raise ExpressionError(
@@ -134,10 +144,25 @@ def read_tokens(tokens: Sequence[Token], text: str) -> Tree:
 def decimal_fraction(text: str) -> Fraction:
     """Return the rational that a decimal number's text stands for.
 
+    Parameters
+    ----------
+    text
+        Decimal number, such as ``"0.1"`` or ``"2e-4"``.
+
+    Returns
+    -------
+    Fraction
+        Its value.
+
     Raises
     ------
     ExpressionError
         It has more digits, or a larger exponent, than any finite double.
+
+    Examples
+    --------
+    >>> decimal_fraction("2.5e-2")
+    Fraction(1, 40)
     """
     mantissa, _, exponent = text.lower().partition("e")
     shown = text if len(text) <= 20 else f"{text[:17]}..."

@@ -208,6 +208,11 @@ def import_cad(
     files
         Names of files by link, where their names do not say it; by -1 those that are left out.
 
+    Returns
+    -------
+    CadImport
+        The description with its new shapes and bodies, and for each part what was found.
+
     Raises
     ------
     ModelError

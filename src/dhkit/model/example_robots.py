@@ -53,10 +53,19 @@ class ExampleChain:
 def example_robots() -> dict[str, Path]:
     """Return the package's URDFs by name: the file's name, after its folder's where two files have the same.
 
+    Returns
+    -------
+    dict[str, Path]
+        URDF files by name.
+
     Raises
     ------
     ModelError
         The package is not installed.
+
+    Examples
+    --------
+    >>> example_robots()["panda"]  # doctest: +SKIP
     """
     try:
         files = distribution(_PACKAGE).files or []
@@ -86,10 +95,19 @@ def example_urdf(name: str) -> Path:
     name
         Name of a robot of example-robot-data.
 
+    Returns
+    -------
+    Path
+        The URDF.
+
     Raises
     ------
     ModelError
         No such robot, or the package is not installed.
+
+    Examples
+    --------
+    >>> example_urdf("panda")  # doctest: +SKIP
     """
     robots = example_robots()
     if name not in robots:
@@ -103,10 +121,25 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
     A name is a path, or ``example:`` and the name of an example robot; after it ``#TIP`` or ``#BASE..TIP`` may name
     the links between which the chain lies. A file that exists under the whole name is that file.
 
+    Parameters
+    ----------
+    name
+        Path, or ``example:NAME``, with or without ``#TIP`` or ``#BASE..TIP``.
+
+    Returns
+    -------
+    tuple[Path, str | None, str | None]
+        File, first and last link of the chain; None where the name does not give them.
+
     Raises
     ------
     ModelError
         No such example robot.
+
+    Examples
+    --------
+    >>> urdf_source("robots/two_arms.urdf#left_base..left_hand")[1:]
+    ('left_base', 'left_hand')
     """
     if not name.startswith(_PREFIX) and Path(name).is_file():
         return Path(name), None, None
@@ -123,6 +156,20 @@ def example_chains() -> Iterator[ExampleChain]:
 
     For a chain with more than seven joints, the limb after the last branching is listed too. Chains with joints that
     follow others are left out. Of several frames after one joint the tool's is taken, or the first.
+
+    Yields
+    ------
+    ExampleChain
+        A chain, named as ``Arm.load`` accepts it.
+
+    Raises
+    ------
+    ModelError
+        The package example-robot-data is not installed.
+
+    Examples
+    --------
+    >>> names = [chain.name for chain in example_chains()]  # doctest: +SKIP
     """
     for name, path in example_robots().items():
         tree = read_urdf(path)

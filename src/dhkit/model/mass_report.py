@@ -52,7 +52,7 @@ class ReportedMass:
 
 
 def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
-    """Read a report of mass properties: ``.csv`` as a table, anything else as the text of SolidWorks.
+    r"""Read a report of mass properties: ``.csv`` as a table, anything else as the text of SolidWorks.
 
     The table has a heading ``link, mass [kg], com_x [mm], com_y, com_z, Ixx [kg mm^2], Iyy, Izz, Ixy, Iyz, Ixz`` with
     the unit of every quantity in brackets, moments about the centre of mass in the axes of the assembly, and, where a
@@ -65,10 +65,24 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     path
         Report of a CAD program as text, or a CSV file.
 
+    Returns
+    -------
+    tuple[ReportedMass, ...]
+        Mass, kg, centre of mass, m, and inertia, kg m^2, of each link that is named.
+
     Raises
     ------
     ModelError
         It cannot be read: one line with file, line, the value found and the value expected.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> moments = [f"I{axes} [kg mm^2]" for axes in ("xx", "yy", "zz", "xy", "yz", "xz")]
+    >>> heading = ", ".join(["link", "mass [kg]", "com_x [mm]", "com_y [mm]", "com_z [mm]", *moments])
+    >>> size = Path("masses.csv").write_text(heading + "\n1, 2.0, 100, 0, 0, 500, 6000, 6000, 0, 0, 0\n")
+    >>> [report.properties.mass for report in read_mass_report("masses.csv")]
+    [2.0]
     """
     path = Path(path)
     content = read_bounded(path, BOUNDS.report_bytes, "a report of mass properties", ModelError)

@@ -74,11 +74,23 @@ def read_mesh(
     max_triangles, max_bytes
         Largest number of triangles and of bytes; a binary file with more triangles is refused from its header.
 
+    Returns
+    -------
+    TriangleMesh
+        Vertices, in the file's units or m, and triangles.
+
     Raises
     ------
     ModelError
         It is not a mesh, too large, or has no triangles, coordinates that are not finite, or indices of no vertex: one
         line that begins with the path.
+
+    Examples
+    --------
+    >>> from dhkit.description import asset
+    >>> path = asset("meshes/puma560/forearm.stl")
+    >>> read_mesh(path).faces.shape[1]
+    3
     """
     path = Path(path)
     header = mesh_header(path, max_bytes)

@@ -50,10 +50,27 @@ def pinocchio_model(description: Description) -> PinocchioModel:
     turn (``couplings``) has no place in a Pinocchio model: M lacks ``numbers.coupling``, tau ``numbers.coupling`` qdd.
     Joint i of the table is joint i of the model; frames ``dh0`` ... ``dhn`` and ``tool``.
 
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    PinocchioModel
+        A ``pinocchio.Model``, built anew by each call.
+
     Raises
     ------
     ModelError
         Pinocchio is not installed (there is no wheel of it for Windows), or refuses the model.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> model = pinocchio_model(library_robot("planar2r"))
+    >>> model.nq, model.existFrame("tool")
+    (2, True)
     """
     pin = import_pinocchio()
     text = mechanics_urdf_text(description)

@@ -59,10 +59,21 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
     path
         Robot file to write, which ends in ``.toml``.
 
+    Returns
+    -------
+    tuple[Path, ...]
+        The files written, the robot file first.
+
     Raises
     ------
     ModelError
         A mesh cannot be read, or a file cannot be written.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> [path.name for path in write_robot_with_meshes(library_robot("planar2r"), "mine.toml")]
+    ['mine.toml']
     """
     path = Path(path)
     names = _copy_names(description)

@@ -103,6 +103,11 @@ def shape_inertia(
     density, mass
         kg/m^3, or kg; exactly one of them.
 
+    Returns
+    -------
+    ShapeInertia
+        Mass, kg, centre of mass, m, inertia about it, kg m^2, and how a mesh that is open was closed.
+
     Raises
     ------
     ModelError

@@ -72,6 +72,16 @@ def link_parts(description: Description) -> tuple[Part, ...]:
     its x. A description that is not ``drawn``, such as one from a URDF with its own shapes, gets none of that unless it
     has no shape at all.
 
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    tuple[Part, ...]
+        Solids with their link, from 0 for the base, their place in the link's frame and their colour.
+
     Examples
     --------
     >>> from dhkit.description.table_rows import from_dh

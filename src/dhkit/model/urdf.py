@@ -73,6 +73,17 @@ def urdf_text(
         From a mesh's path in the robot file to its path in the URDF; ``meshes/...`` if not given.
     collision_path
         The same for collisions, which may use another mesh of the same scale; ``mesh_path`` if not given.
+
+    Returns
+    -------
+    str
+        The text; every DH frame is a link ``dh0`` ... ``dhn``, the tool is ``tool``.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> urdf_text(library_robot("planar2r")).splitlines()[1]
+    '<robot name="planar2r">'
     """
     visual_path = mesh_path or (lambda path: f"{MESHES}/{path}")
     paths = {"visual": visual_path, "collision": collision_path or visual_path}
@@ -127,15 +138,28 @@ def write_urdf(
 
     Parameters
     ----------
+    description
+        The robot.
     path
         The file; its folder is created.
     mesh_prefix
         Beginning of the meshes' names in the URDF, instead of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
 
+    Returns
+    -------
+    tuple[Path, ...]
+        The files written, the URDF first.
+
     Raises
     ------
     ModelError
         A file cannot be written or read.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> [path.name for path in write_urdf(library_robot("planar2r"), "mine/planar2r.urdf")]
+    ['planar2r.urdf']
     """
     path = Path(path)
     prefix = f"{MESHES}/" if mesh_prefix is None else mesh_prefix

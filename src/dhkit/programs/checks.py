@@ -53,6 +53,11 @@ def check(
     progress
         Called with the name of each function before it is scored.
 
+    Returns
+    -------
+    CheckReport
+        Points of each part, with notes on what the program imports and how it was isolated.
+
     Raises
     ------
     ProgramError

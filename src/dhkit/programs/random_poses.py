@@ -19,7 +19,29 @@ _TRIES = 50
 
 
 def random_states(arm: Arm, rng: np.random.Generator, count: int) -> Array:
-    """Return random joint values inside the limits, shape (count, n), rad and m."""
+    """Return random joint values inside the limits, shape (count, n), rad and m.
+
+    Parameters
+    ----------
+    arm
+        The arm; a joint without limits makes a full turn, or the arm's reach to both sides.
+    rng
+        Generator of the random numbers.
+    count
+        Number of states.
+
+    Returns
+    -------
+    Array
+        Shape (count, n), rad and m.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dhkit import Arm
+    >>> random_states(Arm.load("puma560"), np.random.default_rng(0), 5).shape
+    (5, 6)
+    """
     numbers = arm.description.numbers
     free = np.where(numbers.prismatic, arm.description.reach or 1.0, np.pi)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -free)

@@ -3,6 +3,10 @@ from .differentiable.composite_bodies import (
     composite_coriolis_matrix as composite_coriolis_matrix,
     composite_mass_matrix as composite_mass_matrix,
 )
+from .differentiable.derivatives import (
+    recursive_forward_dynamics_derivatives as recursive_forward_dynamics_derivatives,
+    recursive_inverse_dynamics_derivatives as recursive_inverse_dynamics_derivatives,
+)
 from .differentiable.energies import (
     kinetic_energy as kinetic_energy,
     lagrange_coriolis_matrix as lagrange_coriolis_matrix,

@@ -305,5 +305,23 @@ def symbolic_kinematics(description: Description, symbols: Symbols = "file") -> 
         The robot.
     symbols
         ``"none"``, ``"file"`` or ``"inertial"``: names that stay symbols.
+
+    Returns
+    -------
+    SymbolicKinematics
+        Link transforms, the tool's pose and the Jacobian as elements of one ring.
+
+    Raises
+    ------
+    RingError
+        The expressions are too long.
+    ValueError
+        Another choice of symbols.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> print(symbolic_kinematics(library_robot("planar2r")).T[0, 3])
+    l1*c1 + l2*(c1*c2 - s1*s2)
     """
     return SymbolicKinematics(description, derive_kinematics(description, symbols=symbols))

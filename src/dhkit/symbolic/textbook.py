@@ -241,6 +241,11 @@ def derive(
     symbols
         See :func:`dhkit.symbolic.exact.exact_arm`.
 
+    Returns
+    -------
+    TextbookDerivation
+        Every step: positions, velocities, energies, Lagrange's equations.
+
     Raises
     ------
     DescriptionError

@@ -40,6 +40,11 @@ def straight_line(
     duration, limits, torques
         As for :func:`dhkit.trajectories.cubic`.
 
+    Returns
+    -------
+    Trajectory
+        The motion.
+
     Raises
     ------
     ValueError
@@ -87,10 +92,24 @@ def circle(
     q0, duration, limits, torques
         As for :func:`straight_line`.
 
+    Returns
+    -------
+    Trajectory
+        The motion.
+
     Raises
     ------
     ValueError, PlanningError
         As for :func:`straight_line`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, world_to_tool
+    >>> arm = library_robot("planar3r")
+    >>> T0 = world_to_tool(arm, [0.3, 0.6, 0.4])
+    >>> motion = circle(arm, T0, T0[:3, 3] - [0.1, 0, 0], [0, 0, 1], angle=3.0, q0=[0.3, 0.6, 0.4], duration=2.0)
+    >>> motion.duration
+    2.0
     """
     return _along(
         description, tool_circle(T0, centre, axis, angle, turning), q0, duration, limits, torques

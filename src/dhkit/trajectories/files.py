@@ -140,10 +140,23 @@ def written_by_dhkit(path: str | Path) -> str:
     path
         File.
 
+    Returns
+    -------
+    str
+        Title in the file's label; empty where it has none.
+
     Raises
     ------
     DescriptionError
         The file cannot be read, is damaged, or has another suffix.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.trajectories import quintic
+    >>> path = quintic(library_robot("planar2r"), [0, 0], [0.5, 1.0], duration=2.0).save("motion.npz")
+    >>> written_by_dhkit(path)
+    'dhkit trajectory'
     """
     path = Path(path)
     suffix, content = TRAJECTORY.read(path, ARCHIVES + TABLES)
@@ -174,10 +187,24 @@ def read_motion(
     degrees, columns
         For samples from other programs, as for :func:`read_samples`.
 
+    Returns
+    -------
+    Trajectory
+        The motion.
+
     Raises
     ------
     DescriptionError
         One line: what is wrong in the file.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.trajectories import quintic
+    >>> arm = library_robot("planar2r")
+    >>> path = quintic(arm, [0, 0], [0.5, 1.0], duration=2.0).save("motion.npz")
+    >>> read_motion(path, arm).duration
+    2.0
     """
     description = description_of(description)
     title = written_by_dhkit(path)

@@ -88,6 +88,11 @@ def joint_path(
     limits
         Limits whose joint ranges are kept; the robot's own if not given.
 
+    Returns
+    -------
+    JointPath
+        Joint values over the path's parameter from 0 to 1, with derivatives.
+
     Raises
     ------
     PlanningError
@@ -95,6 +100,15 @@ def joint_path(
         or leaves the joint limits; the message names the place.
     ValueError
         q0 has another shape.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, world_to_tool
+    >>> from dhkit.trajectories import tool_line
+    >>> arm = library_robot("planar2r")
+    >>> T0, T1 = world_to_tool(arm, [[0.2, 1.2], [0.8, 1.0]])
+    >>> joint_path(arm, tool_line(T0, T1), q0=[0.2, 1.2]).q(1.0).round(6)
+    array([0.8, 1. ])
     """
     limits = limits or Limits.of(description)
     starts = _starts(description, tool, q0)

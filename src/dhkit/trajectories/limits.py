@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Robot, description_of
+from dhkit.description import Array, Description, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.description.frames import one_each
 from dhkit.display import counted, html_table, repr_line
@@ -16,6 +16,23 @@ from dhkit.trajectories.pieces import Pieces
 
 _POSITION_ROUNDING = 1e-10
 """Distance of a proved bound of joint values from values that are reached, rad and m."""
+ADVICE_ON_LIMITS = "give a duration, or limits such as arm = arm.with_limits(velocity=2.0)"
+"""Advice of errors about a motion that nothing limits."""
+
+
+def advice_on_acceleration(description: Description) -> str:
+    """Return advice on limits for a motion in least time, which speeds alone do not bound, with an example.
+
+    Torques limit an arm whose links have bodies; otherwise accelerations do.
+    """
+    acceleration = "limits=dhkit.Limits.of(arm, acceleration=5.0)"
+    if all(joint.bodies for joint in description.joints):
+        example = "arm = arm.with_limits(velocity=2.0, torque=50.0)"
+        return f"give the arm limits such as {example}, or this motion {acceleration}"
+    return (
+        f"give this motion {acceleration}, and the arm those of speed, such as arm = "
+        "arm.with_limits(velocity=2.0); its links have no bodies, so that torques cannot be limited"
+    )
 
 
 @dataclass(frozen=True, eq=False)

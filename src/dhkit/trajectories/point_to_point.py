@@ -56,6 +56,11 @@ def cubic(
     torques
         As for :func:`dhkit.trajectories.least_slowdown`.
 
+    Returns
+    -------
+    Trajectory
+        The motion.
+
     Raises
     ------
     ValueError
@@ -102,10 +107,22 @@ def quintic(
     qdd0, qdd1
         Accelerations at both ends, shape (n,), per second squared; 0 if not given.
 
+    Returns
+    -------
+    Trajectory
+        The motion.
+
     Raises
     ------
     ValueError, PlanningError
         As for :func:`cubic`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> motion = quintic(library_robot("planar2r"), [0, 0], [0.5, 1.0], duration=2.0)
+    >>> motion.q(1.0), motion.qdd(2.0).round(9)
+    (array([0.25, 0.5 ]), array([0., 0.]))
     """
     q = np.stack([configuration(description, q0, "q0"), configuration(description, q1, "q1")])
     T = _unit(duration, (qd0, qd1, qdd0, qdd1))
@@ -143,6 +160,11 @@ def trapezoidal(
     blend
         Share of the duration for accelerating, and again for braking, in (0, 0.5]; None for the one with the shortest
         duration that the limits allow, and for 0.25 where nothing limits a motion whose duration is given.
+
+    Returns
+    -------
+    Trajectory
+        The motion.
 
     Raises
     ------

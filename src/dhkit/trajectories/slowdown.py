@@ -14,7 +14,7 @@ from dhkit.description import Array, Description
 from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.dynamics import gravity_torque, inverse_dynamics
 from dhkit.errors import PlanningError
-from dhkit.trajectories.limits import Limits, farthest_outside
+from dhkit.trajectories.limits import ADVICE_ON_LIMITS, Limits, farthest_outside
 from dhkit.trajectories.torque_peaks import torque_peaks
 from dhkit.trajectories.trajectory import Trajectory
 
@@ -153,7 +153,7 @@ def least_slowdowns(
             name = trajectory.description.joints[int(np.flatnonzero(moves)[0])].name
             raise PlanningError(
                 f"nothing limits the motion: {name} moves, and has neither a velocity, acceleration, jerk nor torque"
-                " limit that it could reach; give one, or a duration"
+                f" limit that it could reach; {ADVICE_ON_LIMITS}"
             )
     return slowest
 
@@ -174,6 +174,13 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
         It leaves them; the message names the joint, the limit and the time.
     ValueError
         The limits are of another number of joints.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.trajectories import Limits, quintic
+    >>> arm = library_robot("puma560")
+    >>> require_inside(quintic(arm, "ready", "nominal", duration=2.0), Limits.of(arm))
     """
     _check_joints(trajectory, limits)
     farthest = farthest_outside(limits, trajectory.pieces)

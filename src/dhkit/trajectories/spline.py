@@ -38,6 +38,11 @@ def spline(
     limits, torques
         As for :func:`dhkit.trajectories.cubic`.
 
+    Returns
+    -------
+    Trajectory
+        The motion.
+
     Raises
     ------
     ValueError
@@ -46,6 +51,13 @@ def spline(
     PlanningError
         A joint leaves its limits, also between points; the times are too short for the limits given; or no duration
         keeps them.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> motion = spline(library_robot("planar2r"), [[0, 0], [0.5, 0.2], [1.0, 1.0]], times=[0, 1, 2])
+    >>> motion.q(1.0), motion.qd(2.0).round(9)
+    (array([0.5, 0.2]), array([0., 0.]))
     """
     from scipy.interpolate import CubicSpline
 

@@ -169,10 +169,22 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
     T0, T1
         Poses of the tool in the world, shape (4, 4), m.
 
+    Returns
+    -------
+    ToolLine
+        The line, over a parameter from 0 to 1.
+
     Raises
     ------
     ValueError
         Other shapes, or matrices that are not poses.
+
+    Examples
+    --------
+    >>> from dhkit.description import pose
+    >>> line = tool_line(pose((0.5, 0, 0.2)), pose((0.5, 0.2, 0.2)))
+    >>> line.poses(np.array([0.5]))[0, :3, 3]
+    array([0.5, 0.1, 0.2])
     """
     from scipy.spatial.transform import Rotation
 
@@ -205,10 +217,23 @@ def tool_circle(
     turning
         Whether the tool turns with the arc; else its orientation stays.
 
+    Returns
+    -------
+    ToolCircle
+        The arc, over a parameter from 0 to 1.
+
     Raises
     ------
     ValueError
         Other shapes, no pose, values that are not finite, an axis of length 0, or a position on the axis.
+
+    Examples
+    --------
+    >>> from dhkit.description import pose
+    >>> arc = tool_circle(pose((0.5, 0, 0.2)), (0.4, 0, 0.2), (0, 0, 1), angle=3.141592653589793)
+    >>> arc.poses(np.array([0.5, 1.0]))[:, :3, 3].round(6)
+    array([[0.4, 0.1, 0.2],
+           [0.3, 0. , 0.2]])
     """
     start = one_pose(T0, "T0")
     point = _vector(centre, "centre")

@@ -65,6 +65,13 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
         Pinocchio is not installed, or refuses the model.
     ValueError
         ``samples`` is below 1.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> report = verify(library_robot("planar2r"), samples=20)
+    >>> report.ok
+    True
     """
     motion = random_motions(description, samples, seed)
     reference = PinocchioResults(pinocchio_model(description), motion, description.numbers.coupling)

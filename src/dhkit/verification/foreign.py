@@ -94,12 +94,23 @@ def verify_urdf(
     base
         The link that is the world; the root if not given.
 
+    Returns
+    -------
+    VerificationReport
+        The worst error of each quantity, with its state, and the differences found, in words; ``.ok``.
+
     Raises
     ------
     ModelError
         The URDF cannot be read, has another number or other kinds of joints, or Pinocchio is not installed.
     ValueError
         ``samples`` is below 1, or a tolerance that is not positive.
+
+    Examples
+    --------
+    >>> from dhkit.description import asset, library_robot
+    >>> verify_urdf(library_robot("planar2r"), asset("urdf/planar2r.urdf"), samples=20).ok
+    True
     """
     if not 0 < tolerance < np.inf:
         raise ValueError(f"tolerance is {tolerance}; expected a positive, finite number")

@@ -20,8 +20,11 @@ class JointStates(NamedTuple):
     """Joint values, rates and accelerations, each of shape (samples, n), rad, m and seconds."""
 
     q: Array
+    """Joint values, shape (samples, n), rad and m."""
     qd: Array
+    """Rates, shape (samples, n), rad/s and m/s."""
     qdd: Array
+    """Accelerations, shape (samples, n), rad/s^2 and m/s^2."""
 
     def __repr__(self) -> str:
         return repr_line(
@@ -42,10 +45,21 @@ def random_states(description: Description, samples: int, seed: int = 0) -> Arra
     seed
         Seed of the random numbers.
 
+    Returns
+    -------
+    Array
+        Shape (samples, n), rad and m.
+
     Raises
     ------
     ValueError
         ``samples`` is not a whole number from 1 on, or ``seed`` none from 0 on.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> random_states(library_robot("puma560"), 100).shape
+    (100, 6)
     """
     check_whole("samples", samples, 1)
     check_whole("seed", seed, 0)
@@ -72,10 +86,22 @@ def random_motions(description: Description, samples: int, seed: int = 0) -> Joi
     seed
         Seed of the random numbers.
 
+    Returns
+    -------
+    JointStates
+        Fields ``q``, ``qd`` and ``qdd``, shape (samples, n), rad, m and seconds.
+
     Raises
     ------
     ValueError
         ``samples`` is not a whole number from 1 on, or ``seed`` none from 0 on.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> motion = random_motions(library_robot("puma560"), 100)
+    >>> motion.q.shape
+    (100, 6)
     """
     check_whole("samples", samples, 1)
     check_whole("seed", seed, 0)

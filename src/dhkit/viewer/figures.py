@@ -34,8 +34,18 @@ _ZOOM = 0.86
 def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
     """Return a figure of a value; a notebook shows it.
 
-    An arm, or its description, is drawn at joint values ``q``, shape (n,), rad and m, or at a configuration by name; by
-    default in its ``ready`` configuration, or at zero. Other values take no ``q``.
+    Parameters
+    ----------
+    value
+        An arm or its description, a trajectory, a simulation, a workspace or another value that has a figure.
+    q
+        Joint values at which an arm is drawn, shape (n,), rad and m, or a configuration by name; by default its
+        ``ready`` configuration, or zero. Other values take no ``q``.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
 
     Raises
     ------
@@ -71,10 +81,20 @@ def plot_arm(description: Description, q: ArrayLike) -> Figure:
     q
         Joint values, shape (n,), rad and m.
 
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
+
     Raises
     ------
     ValueError
         Another shape, or values that are not finite.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> figure = plot_arm(library_robot("planar2r"), [0.3, 0.6])
     """
     q = joint_vector(description, q)
     figure = new_figure(figsize=(6.4, 6.0), layout="constrained")
@@ -102,10 +122,20 @@ def plot_motion(description: Description, times: ArrayLike, q: ArrayLike) -> Fig
     q
         Joint values, shape (N, n), rad and m.
 
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
+
     Raises
     ------
     ValueError
         Times or joint values have other shapes, are fewer than two or not finite, or times do not increase.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> figure = plot_motion(library_robot("planar2r"), [0.0, 0.5, 1.0], [[0, 0], [0.1, 0.2], [0.2, 0.5]])
     """
     times, q = check_motion(description, times, q)
     kinds = joint_kinds(description)

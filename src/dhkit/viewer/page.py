@@ -63,7 +63,7 @@ _LAB_FILES = (
     "dynamics.js",
     "workspace.js",
     "transforms.js",
-    "submit.js",
+    "answers.js",
     "formula.js",
     "task.js",
     "plot.js",

@@ -74,6 +74,11 @@ def plot_simulation(result: SimulationResult) -> Figure:
     ----------
     result
         The simulation.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
     """
     description = result.description
     kinds = joint_kinds(result.description)
@@ -107,6 +112,11 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
         Simulations by the names of their controllers, of arms with the same kinds of joints.
     title
         Title of the figure; the arm's name and the number of controllers if not given.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
 
     Raises
     ------

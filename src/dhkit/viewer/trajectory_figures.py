@@ -47,6 +47,17 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
     ----------
     trajectory
         The motion.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.trajectories import quintic
+    >>> figure = plot_trajectory(quintic(library_robot("planar2r"), [0, 0], [0.5, 1.0], duration=2.0))
     """
     description = trajectory.description
     samples = _samples(trajectory)
@@ -78,6 +89,11 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
     ----------
     motions
         Motions by name, all of one arm; each link has a body, each joint a speed limit and a torque limit.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
 
     Raises
     ------

@@ -117,6 +117,22 @@ def plot_workspace(workspace: Workspace) -> Figure:
     axis; an arm with a sliding first joint is seen along y and z. A tool that stays in a plane is seen in it. Thin
     lines are the boundaries of the workspace without limits of revolute joints, where they have a closed form
     (:func:`dhkit.kinematics.boundaries.boundaries`).
+
+    Parameters
+    ----------
+    workspace
+        Samples of :func:`dhkit.kinematics.workspace`.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.kinematics import workspace
+    >>> figure = plot_workspace(workspace(library_robot("planar2r"), samples=2000))
     """
     description = workspace.description
     reaches = [_reach(plane, workspace) for plane in _planes(workspace)]
@@ -168,10 +184,20 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     q
         Joint values, shape (n,), rad and m.
 
+    Returns
+    -------
+    Figure
+        A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
+
     Raises
     ------
     ValueError
         The joint values have another shape or are not finite.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> figure = plot_ellipsoid(library_robot("planar2r"), [0.3, 0.6])
     """
     q = joint_vector(description, q)
     ellipsoid = velocity_ellipsoid(description, q)

@@ -134,7 +134,7 @@ class Certificate:
 
     @property
     def violation(self) -> float:
-        """Largest excess, as a share of its limit; 0 without limits."""
+        """Largest excess, as a share of its limit, or of a clearance what is missing of it, m; 0 without limits."""
         return 0.0 if self.worst is None else self.worst.excess
 
     @property
@@ -145,7 +145,7 @@ class Certificate:
         )
 
     def excess_of(self, limit: int) -> float:
-        """Return the largest excess of a constraint, by its place, as a share of the limit; -inf without it.
+        """Return the largest excess of a constraint, by its place, as :attr:`violation` has it; -inf without it.
 
         Parameters
         ----------

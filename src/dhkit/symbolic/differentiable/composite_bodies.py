@@ -41,6 +41,23 @@ def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
         The arm's table in CasADi expressions.
     q
         Joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x n, symmetric, kg m^2, kg m and kg.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q = joint_symbols("q", 2)
+    >>> M = composite_mass_matrix(table, q)
+    >>> casadi.Function("M", [q], [M])([0, 0]).full().round(4)
+    array([[0.9217, 0.23  ],
+           [0.23  , 0.08  ]])
     """
     frames = equation_frames(table, q)
     M: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
@@ -70,6 +87,23 @@ def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX)
         Joint values, n x 1.
     qd
         Joint rates, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x n, kg m^2/s, kg m/s and kg/s: dM/dt - 2 C is skew-symmetric.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd = (joint_symbols(name, 2) for name in ("q", "qd"))
+    >>> C = composite_coriolis_matrix(table, q, qd)
+    >>> casadi.Function("C", [q, qd], [C])([0, 0.5], [1, 2]).full().round(4)
+    array([[-0.1438, -0.2157],
+           [ 0.0719,  0.    ]])
     """
     frames = equation_frames(table, q)
     velocities = link_velocities(frames, qd)

@@ -27,6 +27,22 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
         Joint values, n x 1.
     qd
         Joint rates, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        1 x 1, J.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd = (joint_symbols(name, 2) for name in ("q", "qd"))
+    >>> K = kinetic_energy(table, q, qd)
+    >>> casadi.Function("K", [q, qd], [K])([0, 0], [1, 0])
+    DM(0.460833)
     """
     import casadi
 
@@ -65,6 +81,22 @@ def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
         The arm's table in CasADi expressions.
     q
         Joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        1 x 1, J.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q = joint_symbols("q", 2)
+    >>> V = potential_energy(table, q)
+    >>> casadi.Function("V", [q], [V])([1.5707963267948966, 0])  # upright
+    DM(15.2055)
     """
     import casadi
 
@@ -88,6 +120,23 @@ def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
         The arm's table in CasADi expressions.
     q
         Joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x n, symmetric, kg m^2, kg m and kg.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q = joint_symbols("q", 2)
+    >>> M = lagrange_mass_matrix(table, q)
+    >>> casadi.Function("M", [q], [M])([0, 0]).full().round(4)
+    array([[0.9217, 0.23  ],
+           [0.23  , 0.08  ]])
     """
     import casadi
 
@@ -108,6 +157,23 @@ def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) 
         Joint values, n x 1.
     qd
         Joint rates, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x n, kg m^2/s, kg m/s and kg/s.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd = (joint_symbols(name, 2) for name in ("q", "qd"))
+    >>> C = lagrange_coriolis_matrix(table, q, qd)
+    >>> casadi.Function("C", [q, qd], [C])([0, 0.5], [1, 2]).full().round(4)
+    array([[-0.1438, -0.2157],
+           [ 0.0719,  0.    ]])
     """
     import casadi
 
@@ -127,6 +193,22 @@ def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
         The arm's table in CasADi expressions.
     q
         Joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q = joint_symbols("q", 2)
+    >>> g = lagrange_gravity_torque(table, q)
+    >>> casadi.Function("g", [q], [g])([0, 0])
+    DM([15.2055, 2.943])
     """
     import casadi
 
@@ -146,6 +228,22 @@ def lagrange_inverse_dynamics(
         Joint values, n x 1.
     qd, qdd
         Joint rates and accelerations, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd, qdd = (joint_symbols(name, 2) for name in ("q", "qd", "qdd"))
+    >>> tau = lagrange_inverse_dynamics(table, q, qd, qdd)
+    >>> casadi.Function("tau", [q, qd, qdd], [tau])([0, 0], [1, 0], [0, 2])
+    DM([15.6655, 3.103])
     """
     M = lagrange_mass_matrix(table, q)
     C = lagrange_coriolis_matrix(table, q, qd)
@@ -163,6 +261,22 @@ def lagrange_torque(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casa
         Joint values, n x 1.
     qd, qdd
         Joint rates and accelerations, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd, qdd = (joint_symbols(name, 2) for name in ("q", "qd", "qdd"))
+    >>> tau = lagrange_torque(table, q, qd, qdd)
+    >>> casadi.Function("tau", [q, qd, qdd], [tau])([0, 0], [1, 0], [0, 2])
+    DM([15.6655, 3.103])
     """
     import casadi
 

@@ -28,6 +28,19 @@ def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
         Mass matrix, n x n.
     torque
         Torques less C qd + g, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1; all entries NaN where M is singular.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> M, b = casadi.SX.sym("M", 2, 2), casadi.SX.sym("b", 2)
+    >>> f = casadi.Function("f", [M, b], [solve_for_acceleration(M, b)])
+    >>> f(casadi.DM([[2, 0], [0, 4]]), casadi.DM([2, 2]))
+    DM([1, 0.5])
     """
     import casadi
 
@@ -79,6 +92,23 @@ def recursive_forward_dynamics(
         Joint values, n x 1.
     qd, tau
         Joint rates and torques, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, rad/s^2 and m/s^2; NaN where M is singular.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd = (joint_symbols(name, 2) for name in ("q", "qd"))
+    >>> tau = joint_symbols("tau", 2)
+    >>> qdd = recursive_forward_dynamics(table, q, qd, tau)
+    >>> casadi.Function("qdd", [q, qd, tau], [qdd])([0, 0], [0, 0], [0, 0])
+    DM([-25.8984, 37.6704])
     """
     return solve_for_acceleration(
         composite_mass_matrix(table, q), tau - recursive_bias(table, q, qd)

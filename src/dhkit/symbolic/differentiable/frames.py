@@ -125,6 +125,16 @@ def joint_symbols(name: str, n: int) -> casadi.SX:
         Name of the vector.
     n
         Number of joints.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1.
+
+    Examples
+    --------
+    >>> joint_symbols("q", 2)
+    SX([q_0, q_1])
     """
     import casadi
 
@@ -153,6 +163,25 @@ def table_pattern(description: Description) -> tuple[str, Array]:
     """Return the pattern of an arm's frames as text, and the values of its table's symbols, shape (symbols,), m and 1.
 
     Arms of equal pattern (convention, kinds of joints, places of the numbers 0, 1 and -1) have equal expressions.
+
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    tuple[str, Array]
+        The pattern, and the values in the order of ``SymbolicTable.parametric``'s symbols.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> pattern, values = table_pattern(library_robot("planar2r"))
+    >>> values.shape
+    (2,)
+    >>> table_pattern(library_robot("planar3r"))[0] == pattern
+    False
     """
     pattern = _pattern(description)
     return f"{description.convention.value} {description.kinds} {pattern.code}", pattern.parameters[
@@ -178,6 +207,21 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
         Joint values, n x 1.
     frame
         ``"world"`` or ``"tool"``.
+
+    Returns
+    -------
+    casadi.SX
+        6 x n, m/rad, m/m and rad/rad, 0 for the angular rows of a prismatic joint.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import SymbolicTable, joint_symbols
+    >>> q = joint_symbols("q", 2)
+    >>> J = jacobian(SymbolicTable.of(Arm.load("planar2r")), q)
+    >>> casadi.Function("J", [q], [J])([0, 0])[1, :]
+    DM([[0.9, 0.4]])
     """
     import casadi
 
@@ -216,6 +260,21 @@ def jacobian_dot(
         Joint rates, n x 1.
     frame
         ``"world"`` or ``"tool"``.
+
+    Returns
+    -------
+    casadi.SX
+        6 x n.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import SymbolicTable, joint_symbols
+    >>> q, qd = joint_symbols("q", 2), joint_symbols("qd", 2)
+    >>> Jd = jacobian_dot(SymbolicTable.of(Arm.load("planar2r")), q, qd)
+    >>> casadi.Function("Jd", [q, qd], [Jd])([0, 0], [1, 0])[0, :]
+    DM([[-0.9, -0.4]])
     """
     import casadi
 

@@ -59,7 +59,27 @@ class Friction:
 
 
 def friction_parameters(numbers: Numbers, width: float) -> Array:
-    """Return the inputs of :func:`friction_torque`, shape (3 n + 1,): viscous, dry (two a joint), and the width."""
+    """Return the inputs of :func:`friction_torque` for an arm.
+
+    Parameters
+    ----------
+    numbers
+        The arm's numbers, ``description.numbers``.
+    width
+        Rate, rad/s and m/s, over which smooth dry friction changes its direction; 0 for a step.
+
+    Returns
+    -------
+    Array
+        Shape (3 n + 1,): viscous coefficients, N m s/rad and N s/m, dry friction for positive and negative rates of
+        each joint, N m and N, and the width.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> friction_parameters(library_robot("planar2r").numbers, 0.01)
+    array([0.05, 0.02, 0.  , 0.  , 0.  , 0.  , 0.01])
+    """
     return np.concatenate([numbers.viscous, numbers.coulomb.ravel(), [width]])
 
 
@@ -74,6 +94,21 @@ def friction_torque(qd: casadi.SX, parameters: casadi.SX, *, smooth: bool) -> ca
         Those of :func:`friction_parameters`: N m s/rad and N m (or N s/m and N) at the joint side, c_neg at most 0.
     smooth
         Whether dry friction changes its direction smoothly, over the width; else by a step, 0 at rest.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N, with the sign of the motion.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> qd, parameters = casadi.SX.sym("qd", 1), casadi.SX.sym("p", 4)
+    >>> f = casadi.Function("f", [qd, parameters], [friction_torque(qd, parameters, smooth=False)])
+    >>> f(2.0, [0.1, 3.0, -2.0, 0.0])  # 0.1 * 2 + 3
+    DM(3.2)
+    >>> f(-2.0, [0.1, 3.0, -2.0, 0.0])
+    DM(-2.2)
     """
     import casadi
 

@@ -124,6 +124,13 @@ def inertial_pattern(*descriptions: Description) -> tuple[str, Array]:
     ------
     DescriptionError
         A link without a body.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> pattern, values = inertial_pattern(library_robot("planar2r"))
+    >>> values.shape
+    (6,)
     """
     pattern = _pattern(descriptions)
     values = pattern.parameters

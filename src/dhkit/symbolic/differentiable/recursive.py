@@ -118,6 +118,22 @@ def recursive_inverse_dynamics(
         Joint values, n x 1.
     qd, qdd
         Joint rates and accelerations, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd, qdd = (joint_symbols(name, 2) for name in ("q", "qd", "qdd"))
+    >>> tau = recursive_inverse_dynamics(table, q, qd, qdd)
+    >>> casadi.Function("tau", [q, qd, qdd], [tau])([0, 0], [1, 0], [0, 2])
+    DM([15.6655, 3.103])
     """
     import casadi
 
@@ -176,6 +192,22 @@ def recursive_bias(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
         Joint values, n x 1.
     qd
         Joint rates, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd = (joint_symbols(name, 2) for name in ("q", "qd"))
+    >>> h = recursive_bias(table, q, qd)
+    >>> casadi.Function("h", [q, qd], [h])([0, 0.5], [1, 2])
+    DM([14.2699, 2.65464])
     """
     return recursive_inverse_dynamics(table, q, qd, [0.0] * table.n)
 
@@ -189,5 +221,21 @@ def recursive_gravity(table: InertialTable, q: casadi.SX) -> casadi.SX:
         The arm's table in CasADi expressions.
     q
         Joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x 1, N m and N.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q = joint_symbols("q", 2)
+    >>> g = recursive_gravity(table, q)
+    >>> casadi.Function("g", [q], [g])([0, 0])
+    DM([15.2055, 2.943])
     """
     return recursive_inverse_dynamics(table, q, [0.0] * table.n, [0.0] * table.n)

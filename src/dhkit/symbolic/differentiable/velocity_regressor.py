@@ -47,6 +47,20 @@ def velocity_regressor(
         Free-fall acceleration in the axes of frame 0, m/s^2.
     q, qd, qd_r, qdd_r
         n x 1: joint values, rates, and reference rates and accelerations, rad, m and seconds.
+
+    Returns
+    -------
+    casadi.SX
+        n x 10 n; columns of link i as :func:`dhkit.dynamics.inertial_parameters` lists its parameters.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import SymbolicTable, joint_symbols
+    >>> table = SymbolicTable.of(Arm.load("planar2r"))
+    >>> states = [joint_symbols(name, 2) for name in ("q", "qd", "qd_r", "qdd_r")]
+    >>> velocity_regressor(table, (0.0, -9.81, 0.0), *states).shape
+    (2, 20)
     """
     import casadi
 

@@ -16,8 +16,10 @@ from functools import lru_cache
 from itertools import chain
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dhkit.description import Description, Named, takes_robot
+from dhkit.cached_property import cached_property
+from dhkit.description import Array, Description, Named, joint_array, takes_robot
 from dhkit.display import MOST_ROWS, counted, html_table, repr_line
 from dhkit.expressions import Expression
 from dhkit.symbolic.exact import composite
@@ -25,6 +27,7 @@ from dhkit.symbolic.exact.composite import JointTransform, RigidBody
 from dhkit.symbolic.exact.dependencies import MissingReciprocalError, independent
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
+from dhkit.symbolic.exact.regressor import Regressor, regressor as exact_regressor
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
 from dhkit.symbolic.ring.bounds import BOUNDS
 from dhkit.symbolic.ring.notation import constants_of, generators_of
@@ -56,6 +59,19 @@ class BaseParameters:
         The equations of motion in base parameters.
     full
         The equations of motion in all inertial parameters.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dhkit import Arm
+    >>> arm = Arm.load("planar2r")
+    >>> base = arm.base_parameters()
+    >>> print(base.definitions["MX1"])
+    l1*(m1 + m2) + rx1
+    >>> Y = base.regressor([0.3, -0.5], [1.0, 0.2], [0.5, -1.0])
+    >>> tau = arm.inverse_dynamics([0.3, -0.5], [1.0, 0.2], [0.5, -1.0])
+    >>> bool(np.allclose(Y @ base.values(), tau))
+    True
     """
 
     definitions: Mapping[str, Element]
@@ -87,6 +103,70 @@ class BaseParameters:
             ("parameter", "stands for"), rows, caption, count=len(self), longest=_LONGEST_DEFINITION
         )
 
+    def values(self) -> Array:
+        """Return the arm's base parameters as numbers.
+
+        Returns
+        -------
+        Array
+            Shape (parameters,), in the order of ``names``, SI: masses in kg, first moments in kg m, second moments in
+            kg m^2, rotor inertias in kg m^2 (revolute joint) or kg (prismatic joint).
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> base = Arm.load("planar2r").base_parameters()
+        >>> {name: round(float(value), 4) for name, value in zip(base.names, base.values())}
+        {'ZZ1': 0.5417, 'MX1': 1.25, 'MY1': 0.0, 'ZZ2': 0.08, 'MX2': 0.3, 'MY2': 0.0}
+        """
+        constants = self.lagrangian.constants
+        return np.array([constants[name] for name in self.names])
+
+    def regressor(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Return the matrix Y with tau = Y beta, where beta are base parameters such as :meth:`values`.
+
+        The torques are those of ``inverse_dynamics`` without friction and without a wrench; they include the drives'
+        inertia, whose parameters are ``Ia...`` or are grouped with second moments.
+
+        Parameters
+        ----------
+        q, qd, qdd
+            Joint values, rates and accelerations, shape (..., n), rad, m and seconds; batch axes broadcast.
+
+        Returns
+        -------
+        Array
+            Shape (..., n, parameters), columns in the order of ``names``; NaN where a state is not finite.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric.
+
+        Examples
+        --------
+        >>> from dhkit import Arm
+        >>> base = Arm.load("puma560").base_parameters()
+        >>> base.regressor([[0.1] * 6, [0.2] * 6], [0.0] * 6, [0.0] * 6).shape
+        (2, 6, 40)
+        """
+        description = self.full.description
+        q, qd, qdd = np.broadcast_arrays(
+            joint_array(description, q, "q"),
+            joint_array(description, qd, "qd"),
+            joint_array(description, qdd, "qdd"),
+        )
+        finite = np.isfinite(q + qd + qdd).all(axis=-1)
+        states = (np.where(finite[..., None], x, 0.0) for x in (q, qd, qdd))
+        Y = self.lagrangian.evaluate(self._exact_regressor.Y, *states)
+        Y[~finite] = np.nan
+        return Y
+
+    @cached_property
+    def _exact_regressor(self) -> Regressor:
+        """The regressor of the equations in base parameters, as elements."""
+        return exact_regressor(self.lagrangian)
+
     def prove(self) -> Proof:
         """Decide whether the equations in base parameters equal the full ones, by substituting the definitions.
 
@@ -108,6 +188,16 @@ class BaseParameters:
 @lru_cache(maxsize=32)
 def base_parameters(description: Description) -> BaseParameters:
     """Return an arm's base parameters with their definitions, and its equations of motion in them.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+
+    Returns
+    -------
+    BaseParameters
+        Names and definitions, the equations of motion in them, their numbers and their regressor.
 
     Raises
     ------

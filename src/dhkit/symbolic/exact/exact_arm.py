@@ -194,12 +194,25 @@ def exact_arm(
     needed
         Further expressions whose constants the ring contains.
 
+    Returns
+    -------
+    ExactArm
+        The arm's rows, bodies, gravity and drives as elements of one ring.
+
     Raises
     ------
     DescriptionError
         A link has no body.
     ValueError
         Another choice of symbols.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> exact_arm(library_robot("planar2r")).ring.constants
+    ('g', 'l1', 'm1', 'l2', 'm2')
+    >>> exact_arm(library_robot("planar2r"), "none").ring.constants
+    ()
     """
     if not isinstance(description, Description):
         return exact_arm(description_of(description), symbols, needed)

@@ -378,6 +378,27 @@ def lagrangian(
         ``"none"``, ``"file"`` or ``"inertial"``: names that stay symbols.
     needed
         Further expressions whose constants the ring contains.
+
+    Returns
+    -------
+    Lagrangian
+        M, C, g, energies and torques as elements of one ring, with proofs.
+
+    Raises
+    ------
+    DescriptionError
+        A link has no body.
+    RingError
+        The equations are too long.
+    ValueError
+        Another choice of symbols.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> lag = lagrangian(library_robot("planar2r"))
+    >>> print(lag.M[1, 1])
+    m2*l2^2/3
     """
     arm = exact_arm(description, symbols, needed)
     return Lagrangian(arm, composite.mass_matrix(arm), composite.potential_energy(arm))

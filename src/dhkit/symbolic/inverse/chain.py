@@ -285,7 +285,24 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
 
 @takes_robot
 def table_lengths(description: Description) -> dict[str, Fraction]:
-    """Return the lengths of a table that are numbers, by the names that derivations give them: a2, d3, m."""
+    """Return the lengths of a table that are numbers, by the names that derivations give them: a2, d3, m.
+
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    dict[str, Fraction]
+        Lengths, m, exact; those that the file names as parameters are left out.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> {name: float(length) for name, length in table_lengths(library_robot("puma560")).items()}
+    {'d1': 0.67183, 'a2': 0.4318, 'a3': 0.0203, 'd3': 0.15005, 'd4': 0.4318}
+    """
     naming = Naming(description, "inertial")
     found = {}
     for i, joint in enumerate(description.joints, start=1):

@@ -467,10 +467,26 @@ def inverse_derivation(description: Description) -> InverseDerivation:
     Lengths of the table that are numbers get names (a2, d3; i is the row's number), and angles stay numbers. Where an
     arm has a closed form only by the values of its parameters, these values are used, and a note says so.
 
+    Parameters
+    ----------
+    description
+        The robot.
+
+    Returns
+    -------
+    InverseDerivation
+        Steps with their formulas, in text, LaTeX and as a program.
+
     Raises
     ------
     DescriptionError
         No closed form is known; the message names the axes that do not meet or are not parallel, and an alternative.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> inverse_derivation(library_robot("planar2r"))
+    <InverseDerivation of planar2r: 2 parallel revolute axes, 3 steps>
     """
     description, notes = without_rounding(description)
 

@@ -410,6 +410,16 @@ def operation_count(graph: Graph) -> dict[str, int]:
 
     Subtractions count as additions; comparisons, choices and the like are ``"others"``; inputs and constants are free.
 
+    Parameters
+    ----------
+    graph
+        Program.
+
+    Returns
+    -------
+    dict[str, int]
+        Numbers by kind, sorted by name; kinds that do not occur are left out.
+
     Examples
     --------
     >>> import casadi

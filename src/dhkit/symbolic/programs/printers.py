@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dhkit.description import write_atomically
@@ -33,6 +33,33 @@ def c_source(graph: Graph) -> str:
     """Return a C99 function ``void NAME(const double *input, ..., double *output, ...)``; arrays are row by row.
 
     Inputs and outputs must not overlap. The function needs only the standard mathematical functions.
+
+    Parameters
+    ----------
+    graph
+        Program.
+
+    Returns
+    -------
+    str
+        Source of one function, without ``#include``.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit.symbolic import Graph
+    >>> x = casadi.SX.sym("x")
+    >>> print(c_source(Graph.of("line", {"x": x}, {"y": 3 * casadi.sin(x) - 1})).rstrip())
+    void line(const double *x, double *y)
+    {
+        const double v0 = 3.0;
+        const double v1 = x[0];
+        const double v2 = sin(v1);
+        const double v3 = v0 * v2;
+        const double v4 = 1.0;
+        const double v5 = v3 - v4;
+        y[0] = v5;
+    }
     """
     used = {node.arguments[0] for node in graph.nodes if node.operation == "input"}
     unused = [x for k, x in enumerate(graph.inputs) if x.size and k not in used]
@@ -48,7 +75,11 @@ def c_source(graph: Graph) -> str:
 
 
 def export_c(
-    graphs: Sequence[Graph], folder: str | Path, name: str, remark: str = ""
+    graphs: Sequence[Graph],
+    folder: str | Path,
+    name: str,
+    remark: str = "",
+    explanations: Mapping[str, Sequence[str]] | None = None,
 ) -> tuple[Path, Path]:
     """Write programs as ``NAME.c`` and ``NAME.h``, self-contained C99 (link with -lm); return both paths.
 
@@ -62,22 +93,40 @@ def export_c(
         The files' name, an identifier.
     remark
         Text of the files' first comment.
+    explanations
+        Lines that the header has below the shapes of a function, by the program's name.
+
+    Returns
+    -------
+    tuple[Path, Path]
+        Source and header.
 
     Raises
     ------
     ValueError
         ``name`` is not an identifier.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit.symbolic import Graph
+    >>> x = casadi.SX.sym("x")
+    >>> export_c([Graph.of("line", {"x": x}, {"y": 3 * x - 1})], ".", "line")[1].name
+    'line.h'
     """
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
         raise ValueError(f"name is {name!r}; expected an identifier of C")
     header = Path(folder) / f"{name}.h"
     source = header.with_suffix(".c")
 
-    # ASCII only, and the text does not end the comment.
-    comment = re.sub(r"[^ -~\n]", "?", remark).replace("*/", "* /") or name
+    comment = _comment_text(remark) or name
+    explained = explanations or {}
 
     guard = f"{name.upper()}_H"
-    declarations = "".join(_c_comment(graph) + _c_signature(graph) + ";\n\n" for graph in graphs)
+    declarations = "".join(
+        _c_comment(graph, explained.get(graph.name, ())) + _c_signature(graph) + ";\n\n"
+        for graph in graphs
+    )
     write_atomically(
         header,
         f"/* {comment} */\n#ifndef {guard}\n#define {guard}\n\n"
@@ -108,8 +157,15 @@ def _c_signature(graph: Graph) -> str:
     return f"void {graph.name}({', '.join([*inputs, *outputs])})"
 
 
-def _c_comment(graph: Graph) -> str:
-    """Return a comment with the shapes of a program's inputs and outputs."""
+def _c_comment(graph: Graph, explanation: Sequence[str]) -> str:
+    """Return a comment with the shapes of a program's inputs and outputs, and lines that explain them."""
     variables = [variable for variable in (*graph.inputs, *graph.outputs) if variable.size]
     shapes = [f"{variable.name}: {' x '.join(map(str, variable.shape))}" for variable in variables]
-    return f"/* {'; '.join(shapes)}; row by row, SI and radians */\n"
+    first = f"/* {'; '.join(shapes)}; row by row, SI and radians"
+    lines = [f" * {_comment_text(line)}".rstrip() for line in explanation]
+    return "\n".join([first, *lines]) + ("\n */\n" if lines else " */\n")
+
+
+def _comment_text(text: str) -> str:
+    """Return text as a comment of C may hold it: ASCII only, and without the end of a comment."""
+    return re.sub(r"[^ -~\n]", "?", text).replace("*/", "* /")

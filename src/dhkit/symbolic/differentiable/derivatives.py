@@ -1,0 +1,100 @@
+"""Derivatives of inverse and forward dynamics with respect to the state, by CasADi's algorithmic differentiation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dhkit.symbolic.differentiable.composite_bodies import composite_mass_matrix
+from dhkit.symbolic.differentiable.forward_dynamics import (
+    recursive_forward_dynamics,
+    solve_for_acceleration,
+)
+from dhkit.symbolic.differentiable.inertial_table import InertialTable
+from dhkit.symbolic.differentiable.recursive import recursive_inverse_dynamics
+
+if TYPE_CHECKING:
+    import casadi
+
+
+def recursive_inverse_dynamics_derivatives(
+    table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX
+) -> casadi.SX:
+    """Return d tau/dq, d tau/dqd and d tau/dqdd = M below each other, 3 n x n, with drives and without friction.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Symbols of the joint values, n x 1.
+    qd, qdd
+        Symbols of the joint rates and accelerations, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        3 n x n: N m and N per unit of q, qd and qdd.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> states = [joint_symbols(name, 2) for name in ("q", "qd", "qdd")]
+    >>> recursive_inverse_dynamics_derivatives(table, *states).shape
+    (6, 2)
+    """
+    import casadi
+
+    tau = recursive_inverse_dynamics(table, q, qd, qdd)
+    by_state = [casadi.jacobian(tau, x) for x in (q, qd)]
+    return casadi.vertcat(*by_state, composite_mass_matrix(table, q))
+
+
+def recursive_forward_dynamics_derivatives(
+    table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX
+) -> casadi.SX:
+    """Return d qdd/dq, d qdd/dqd and d qdd/dtau = M^-1 below each other, 3 n x n, with drives and without friction.
+
+    Differentiating tau = ID(q, qd, qdd) at constant torques (Carpentier & Mansard, Analytical Derivatives of Rigid Body
+    Dynamics Algorithms, 2018, eq. 15):
+
+        M dqdd = -(d ID/dq) dq - (d ID/dqd) dqd + dtau.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Symbols of the joint values, n x 1.
+    qd, tau
+        Symbols of the joint rates and torques, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        3 n x n: rad/s^2 and m/s^2 per unit of q, qd and tau; NaN where M is singular.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> states = [joint_symbols(name, 2) for name in ("q", "qd", "tau")]
+    >>> recursive_forward_dynamics_derivatives(table, *states).shape
+    (6, 2)
+    """
+    import casadi
+
+    n = q.shape[0]
+    qdd = casadi.SX.sym("qdd", n)
+    inverse = recursive_inverse_dynamics(table, q, qd, qdd)
+    by_state = casadi.horzcat(casadi.jacobian(inverse, q), casadi.jacobian(inverse, qd))
+    at_qdd = casadi.substitute(by_state, qdd, recursive_forward_dynamics(table, q, qd, tau))
+
+    # The factors of M occur in every column; a program computes equal operations once.
+    M = composite_mass_matrix(table, q)
+    right_sides = casadi.horzcat(-at_qdd, casadi.SX.eye(n))
+    columns = [solve_for_acceleration(M, right_sides[:, k]) for k in range(3 * n)]
+    blocks = [casadi.horzcat(*columns[k * n : (k + 1) * n]) for k in range(3)]
+    return casadi.vertcat(*blocks)
