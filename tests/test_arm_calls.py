@@ -6,11 +6,13 @@ import gc
 import os
 import pickle
 import resource
+import signal
 import subprocess
 import sys
 import threading
 import types
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -34,15 +36,29 @@ STATES = {
     "bias": 2,
     "inverse_dynamics": 3,
     "forward_dynamics": 3,
+    "regressor": 3,
+    "inverse_dynamics_derivatives": 3,
+    "forward_dynamics_derivatives": 3,
 }
 """Methods by name, and how many joint vectors they take."""
 
 
 def ordinary(method):
-    """Return the function behind a method of Arm."""
+    """Return the function behind a method of Arm, with derivatives as one array."""
     if method == "fk":
         return kinematics.forward_kinematics
-    return getattr(kinematics, method, None) or getattr(dynamics, method)
+    function = getattr(kinematics, method, None) or getattr(dynamics, method)
+    return partial(in_one_array, function) if method.endswith("derivatives") else function
+
+
+def in_one_array(function, *arguments, **options):
+    return np.stack(function(*arguments, **options), axis=-3)
+
+
+def called(arm, method):
+    """Return a method of an arm, with derivatives as one array."""
+    function = getattr(arm, method)
+    return partial(in_one_array, function) if method.endswith("derivatives") else function
 
 
 def compiled(arm):
@@ -188,7 +204,7 @@ def test_unusual_arguments_give_the_same_values_and_exceptions(puma, tmp_path, l
                 for value in unusual(rng, puma.n, tmp_path):
                     states = [plain] * count
                     states[place] = value
-                    found = outcome(getattr(puma, method), *states)
+                    found = outcome(called(puma, method), *states)
                     assert_same(found, outcome(ordinary(method), puma, *states))
 
 
@@ -215,10 +231,10 @@ def test_unusual_results_give_the_same_values_and_exceptions(puma, law):
                 [],
                 "out",
             ):
-                found = outcome(getattr(puma, method), *states, out=out)
+                found = outcome(called(puma, method), *states, out=out)
                 assert_same(found, outcome(ordinary(method), puma, *states, out=out))
             assert_same(
-                outcome(getattr(puma, method), *states, threads=0),
+                outcome(called(puma, method), *states, threads=0),
                 outcome(ordinary(method), puma, *states, threads=0),
             )
 
@@ -241,6 +257,38 @@ def test_a_result_may_lie_where_an_input_lies(puma):
                     out = memory[: expected.size].reshape(expected.shape)
                     getattr(puma, method)(*own, out=out)
                     assert np.allclose(out, expected, rtol=1e-9, atol=1e-9), (method, shift)
+
+
+@pytest.mark.parametrize("name", ["planar2r", "puma560", "stanford", "panda"])
+def test_a_state_gets_the_same_bits_alone_and_in_a_compiled_batch(name):
+    arm = compiled(Arm.load(name))
+    arm.compile()
+    states = np.random.default_rng(8).uniform(-3, 3, (3, 70, arm.n))
+    for method, count in STATES.items():
+        batch = ordinary(method)(arm, *states[:count])
+        for k in range(0, 70, 7):
+            assert np.array_equal(called(arm, method)(*states[:count, k]), batch[k]), method
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="timers of POSIX")
+def test_a_signal_handler_that_calls_the_same_function_changes_nothing(puma):
+    q = np.linspace(0.1, 0.6, 6)
+    T = puma.fk(q)
+    seen = []
+
+    def handler(*_):
+        seen.append((puma.fk(-2 * q), puma.ik(T).q))
+
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        while len(seen) < 300:
+            if signal.getitimer(signal.ITIMER_REAL)[0] == 0:
+                signal.setitimer(signal.ITIMER_REAL, 2e-4)
+            assert np.array_equal(puma.fk(q), T)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert all(np.array_equal(a, seen[0][0]) and np.array_equal(b, seen[0][1]) for a, b in seen)
 
 
 def test_a_missing_acceleration_is_explained_by_the_ordinary_way(caplog):

@@ -34,10 +34,16 @@ from dhkit import (
 )
 from dhkit.control.batch_result import History
 from dhkit.display import LONGEST_LINE, MOST_ROWS, html_table, plain, repr_line
-from dhkit.dynamics import ParameterGrouping, dynamics_graph, parameter_grouping
+from dhkit.dynamics import (
+    ForwardDynamicsDerivatives,
+    InverseDynamicsDerivatives,
+    ParameterGrouping,
+    dynamics_graph,
+    parameter_grouping,
+)
 from dhkit.execution.isolation import Kind
 from dhkit.expressions import Atom, Budget, Expression, parse
-from dhkit.kernels import Kernel
+from dhkit.kernels import Kernel, SingleCall
 from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
 from dhkit.planning.certificate.checker import Check
@@ -378,6 +384,13 @@ VALUES = {
     Budget: Budget,
     Expression: long_sum,
     Kernel: lambda: kinematic_kernels(planar().description)[0],
+    SingleCall: lambda: planar()._calls.fk,
+    ForwardDynamicsDerivatives: lambda: planar().forward_dynamics_derivatives(
+        [0, 0], [0, 0], [0, 0]
+    ),
+    InverseDynamicsDerivatives: lambda: planar().inverse_dynamics_derivatives(
+        [0, 0], [0, 0], [0, 0]
+    ),
     ParameterGrouping: lambda: parameter_grouping(puma().description),
     # grading
     grading.Credit: grading.Credit,

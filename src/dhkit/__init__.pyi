@@ -42,7 +42,11 @@ from .description import (
     pose_parts as pose_parts,
     robots as robots,
 )
-from .dynamics import Friction as Friction
+from .dynamics import (
+    ForwardDynamicsDerivatives as ForwardDynamicsDerivatives,
+    Friction as Friction,
+    InverseDynamicsDerivatives as InverseDynamicsDerivatives,
+)
 from .errors import (
     AnswerError as AnswerError,
     DescriptionError as DescriptionError,

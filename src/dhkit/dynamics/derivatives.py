@@ -7,6 +7,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, takes_robot
+from dhkit.display import repr_line
 from dhkit.dynamics.programs import evaluate
 
 
@@ -25,9 +26,12 @@ class InverseDynamicsDerivatives(NamedTuple):
         """Return views of the three derivatives in one array, shape (..., 3, n, n), units as above."""
         return cls(stacked[..., 0, :, :], stacked[..., 1, :, :], stacked[..., 2, :, :])
 
+    def __repr__(self) -> str:
+        return _line(self)
+
 
 class ForwardDynamicsDerivatives(NamedTuple):
-    """Derivatives of the accelerations; ``ddq_dq``, ``ddq_dv`` and ``Minv`` of Pinocchio's ``computeABADerivatives``."""
+    """Derivatives of the accelerations; Pinocchio's ``ddq_dq``, ``ddq_dv`` and ``Minv`` of ``computeABADerivatives``."""
 
     dqdd_dq: Array
     """Shape (..., n, n): entry i, j is the derivative of qdd_i by q_j, 1/s^2 where both joints are of a kind."""
@@ -40,6 +44,16 @@ class ForwardDynamicsDerivatives(NamedTuple):
     def of(cls, stacked: Array) -> ForwardDynamicsDerivatives:
         """Return views of the three derivatives in one array, shape (..., 3, n, n), units as above."""
         return cls(stacked[..., 0, :, :], stacked[..., 1, :, :], stacked[..., 2, :, :])
+
+    def __repr__(self) -> str:
+        return _line(self)
+
+
+def _line(derivatives: InverseDynamicsDerivatives | ForwardDynamicsDerivatives) -> str:
+    shape = derivatives[0].shape
+    return repr_line(
+        type(derivatives).__name__, ", ".join(derivatives._fields), f"shape {shape} each"
+    )
 
 
 @takes_robot

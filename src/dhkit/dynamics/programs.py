@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.dynamics.loads import friction_kernel, wrench_kernel
+from dhkit.dynamics.regressor import regressor_kernel
 from dhkit.kernels import Kernel, fill, kernel
 from dhkit.symbolic import (
     Graph,
@@ -133,7 +134,7 @@ def dynamics_graph(quantity: str, description: Description) -> Graph:
 
 @takes_robot
 def dynamic_kernels(description: Description) -> list[Kernel]:
-    """Return the kernels of friction and wrenches and, for an arm with bodies, of its equation of motion.
+    """Return the kernels of friction, wrenches and regressor and, for an arm with bodies, of its equation of motion.
 
     Parameters
     ----------
@@ -143,16 +144,17 @@ def dynamic_kernels(description: Description) -> list[Kernel]:
     Returns
     -------
     list[Kernel]
-        The kernels that ``arm.compile`` compiles: of friction and wrenches alone where a link has no body.
+        The kernels that ``arm.compile`` compiles: the first ones alone where a link has no body.
 
     Examples
     --------
     >>> from dhkit.description import library_robot
     >>> len(dynamic_kernels(library_robot("planar2r")))
-    11
+    14
     """
     kernels = [friction_kernel(description.n, smooth) for smooth in (False, True)]
     kernels.append(wrench_kernel(description)[0])
+    kernels.append(regressor_kernel(description)[0])
     if all(joint.bodies for joint in description.joints):
         kernels += [dynamics_kernel(quantity, description)[0] for quantity in _EXPRESSIONS]
     return kernels

@@ -5,7 +5,8 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain
+from functools import cached_property
+from itertools import chain, islice
 from typing import TypeAlias
 
 from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
@@ -24,7 +25,9 @@ from dhkit.kernels.vectors import (
 from dhkit.symbolic import Graph
 
 BLOCK = 64
-"""Number of items of a block: 8 vectors of 8 doubles; all rows of a block fit into the first-level cache."""
+"""Largest number of items of a block: 8 vectors of 8 doubles."""
+_BLOCK_BYTES = 44 * 1024
+"""Largest size of a block of more than one vector, so that it fits into a first-level cache of 48 KB."""
 
 FLOAT = "float64"
 """Type of an output's entries, by NumPy's name."""
@@ -63,28 +66,44 @@ _LOGICAL: Mapping[str, Callable[..., Mask]] = {
 
 @dataclass(frozen=True)
 class _Layout:
-    """Rows of a block for the entries of a program's variables; a row has ``BLOCK`` doubles."""
+    """Rows of a block for the entries of a program's variables; a row has ``block`` doubles.
+
+    Entries of an output that are the same node, such as those that are always 0 and both triangles of a symmetric
+    matrix, share a row.
+    """
 
     graph: Graph
 
-    @property
-    def inputs(self) -> list[int]:
-        """First row of each input after the parameters, and the row after the last."""
-        return [0, *accumulate(variable.size for variable in self.graph.inputs[1:])]
+    @cached_property
+    def inputs(self) -> list[list[int]]:
+        """The row of each entry of each input after the parameters."""
+        rows = iter(range(sum(variable.size for variable in self.graph.inputs[1:])))
+        return [list(islice(rows, variable.size)) for variable in self.graph.inputs[1:]]
+
+    @cached_property
+    def outputs(self) -> list[list[int]]:
+        """The row of each entry of each output."""
+        first = sum(map(len, self.inputs))
+        rows: dict[tuple[int, int], int] = {}
+        return [
+            [rows.setdefault((k, place), first + len(rows)) for place in places]
+            for k, places in enumerate(self.graph.results)
+        ]
 
     @property
-    def outputs(self) -> list[int]:
-        """First row of each output, and the row after the last."""
-        sizes = [variable.size for variable in self.graph.outputs]
-        return list(accumulate(sizes, initial=self.inputs[-1]))
+    def block(self) -> int:
+        """Number of items of a block: its rows fill at most ``_BLOCK_BYTES``, in whole vectors."""
+        rows = 1 + max(chain.from_iterable((*self.inputs, *self.outputs)))
+        fitting = _BLOCK_BYTES // (8 * rows) // WIDTH * WIDTH
+        return max(WIDTH, min(fitting, BLOCK))
 
 
 def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     """Return a module with ``void kernel(double *parameters, void **arrays, double *work, int64 count)``.
 
     ``arrays`` holds the addresses of inputs, then outputs: (count, size) each, row by row. They are transposed block by
-    block in ``work`` (``BLOCK`` doubles for each of their columns, aligned to 64 bytes), so that every load and store
-    of the program is of neighbouring items. Where an item's input is not finite, its float results are NaN.
+    block in ``work`` (at most ``BLOCK`` doubles for each of their columns, aligned to 64 bytes), so that every load and
+    store of the program is of neighbouring items. Where an item's input is not finite, its float results are NaN.
 
     Parameters
     ----------
@@ -110,8 +129,8 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         "block:",
         "  %start = phi i64 [0, %entry], [%next_start, %written]",
         "  %left = sub i64 %count, %start",
-        f"  %partial = icmp slt i64 %left, {BLOCK}",
-        f"  %size = select i1 %partial, i64 %left, i64 {BLOCK}",
+        f"  %partial = icmp slt i64 %left, {layout.block}",
+        f"  %size = select i1 %partial, i64 %left, i64 {layout.block}",
         "  br label %read0",
     ]
     for k, name in enumerate(inputs):
@@ -120,8 +139,8 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
             f"read{k}",
             before,
             name,
-            graph.inputs[k + 1].size,
             layout.inputs[k],
+            layout.block,
             "double",
             reading=True,
         )
@@ -139,12 +158,12 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         before = f"write{k - 1}_end" if k else "compute"
         kind = _STORED[types[k]]
         lines += _copied(
-            f"write{k}", before, name, graph.outputs[k].size, layout.outputs[k], kind, reading=False
+            f"write{k}", before, name, layout.outputs[k], layout.block, kind, reading=False
         )
         lines += [f"  br label %{f'write{k + 1}' if k + 1 < len(outputs) else 'written'}"]
     lines += [
         "written:",
-        f"  %next_start = add i64 %start, {BLOCK}",
+        f"  %next_start = add i64 %start, {layout.block}",
         "  %more = icmp slt i64 %next_start, %count",
         "  br i1 %more, label %block, label %end",
         "end:",
@@ -156,15 +175,16 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
 
 def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) -> list[str]:
     """Write the program's operations into ``body`` and return the lines that store its results."""
-    rows = []
-    for start, variable in zip(layout.inputs, graph.inputs[1:], strict=False):
-        rows.append([_loaded(body, start + entry) for entry in range(variable.size)])
+    states = [[_loaded(body, row, layout.block) for row in rows] for rows in layout.inputs]
     parameters = [Vector(body, f"%p{k}") for k in range(graph.inputs[0].size)]
+    results: dict[int, Vector] = {}
+    outputs = result_values(graph, body, [parameters, *states], types)
+    for rows, entries in zip(layout.outputs, outputs, strict=True):
+        results.update(zip(rows, entries, strict=True))
     lines = []
-    for k, results in enumerate(result_values(graph, body, [parameters, *rows], types)):
-        for entry, result in enumerate(results):
-            address = _address(body, layout.outputs[k] + entry)
-            lines.append(f"  store {body.number_type} {result.name}, ptr {address}, align 64")
+    for row, result in results.items():
+        address = _address(body, row, layout.block)
+        lines.append(f"  store {body.number_type} {result.name}, ptr {address}, align 64")
     return lines
 
 
@@ -305,21 +325,27 @@ def _array(k: int, name: str) -> Iterator[str]:
     yield f"  {name} = load ptr, ptr {name}_at"
 
 
-def _address(body: Body, row: int) -> str:
+def _address(body: Body, row: int, block: int) -> str:
     """Return the address of the current vector in a row."""
-    # work[row BLOCK + item], of doubles: the items of a row are neighbours.
-    start = body.define(f"getelementptr double, ptr %work, i64 {row * BLOCK}")
+    # work[row block + item], of doubles: the items of a row are neighbours.
+    start = body.define(f"getelementptr double, ptr %work, i64 {row * block}")
     return body.define(f"getelementptr double, ptr {start}, i64 %item")
 
 
-def _loaded(body: Body, row: int) -> Vector:
-    return Vector(
-        body, body.define(f"load {body.number_type}, ptr {_address(body, row)}, align 64")
-    )
+def _loaded(body: Body, row: int, block: int) -> Vector:
+    address = _address(body, row, block)
+    return Vector(body, body.define(f"load {body.number_type}, ptr {address}, align 64"))
 
 
 def _copied(
-    label: str, before: str, array: str, size: int, row: int, kind: str, *, reading: bool
+    label: str,
+    before: str,
+    array: str,
+    rows: Sequence[int],
+    block: int,
+    kind: str,
+    *,
+    reading: bool,
 ) -> Iterator[str]:
     """Yield a loop over a block's items that copies rows of ``array`` into the block, or back.
 
@@ -329,10 +355,12 @@ def _copied(
         Label of the loop; it ends in LABEL_end, from where the caller jumps on.
     before
         The label that jumps here.
-    array, size
-        The array's pointer and how many entries an item has.
-    row
-        The block's first row of the array.
+    array
+        The array's pointer.
+    rows
+        The block's row for each entry of an item.
+    block
+        Number of items of a block.
     kind
         LLVM's type of the array's entries.
     reading
@@ -341,16 +369,16 @@ def _copied(
     yield f"{label}:"
     yield f"  %{label}_i = phi i64 [0, %{before}], [%{label}_next, %{label}]"
     yield f"  %{label}_item = add i64 %start, %{label}_i"
-    yield f"  %{label}_offset = mul i64 %{label}_item, {size}"
+    yield f"  %{label}_offset = mul i64 %{label}_item, {len(rows)}"
     yield f"  %{label}_entries = getelementptr {kind}, ptr {array}, i64 %{label}_offset"
     yield f"  %{label}_column = getelementptr double, ptr %work, i64 %{label}_i"
-    # array[(start + i) size + k] <-> work[(row + k) BLOCK + i] for item i of the block and entry k: a transposition.
-    for k in range(size):
+    # array[(start + i) size + k] <-> work[row_k block + i] for item i of the block and entry k: a transposition.
+    for k, row in enumerate(rows):
         outer = f"%{label}_outer{k}"
         inner = f"%{label}_inner{k}"
         value = f"%{label}_value{k}"
         yield f"  {outer} = getelementptr {kind}, ptr %{label}_entries, i64 {k}"
-        yield f"  {inner} = getelementptr double, ptr %{label}_column, i64 {(row + k) * BLOCK}"
+        yield f"  {inner} = getelementptr double, ptr %{label}_column, i64 {row * block}"
         yield f"  {value} = load double, ptr {outer if reading else inner}"
         if kind != "double":
             # In two steps, because the processor's instruction converts to 32 bits.

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.display import repr_line
 from dhkit.kernels.call_source import (
     AXES_OFFSET,
     CONTEXT,
@@ -113,6 +114,10 @@ class SingleCall:
             self._start()
         return None
 
+    def __repr__(self) -> str:
+        counted = f"{self._calls} of {CALLS_BEFORE_COMPILING} calls"
+        return repr_line(f"SingleCall {self._kernel.name}", summary=f"not compiled, {counted}")
+
     def compile(self) -> FastCall:
         """Make the function now and install it; :func:`never` if it cannot be made here."""
         with compiling():
@@ -188,7 +193,7 @@ def _are_near(found: Sequence[NDArray[Any]], expected: Sequence[NDArray[Any]]) -
 
 
 def unpacked(packed: bytes, graph: Graph, types: Sequence[str]) -> list[NDArray[Any]]:
-    """Return the outputs of a program after the first one, shape (size,) each, as new arrays.
+    """Return the outputs of a program after the first one from what a function packed.
 
     Parameters
     ----------
@@ -196,6 +201,11 @@ def unpacked(packed: bytes, graph: Graph, types: Sequence[str]) -> list[NDArray[
         The second part of a function's result.
     graph, types
         The program, and the types of its outputs.
+
+    Returns
+    -------
+    list
+        The entries of each output, shape (size,), as new arrays.
     """
     outputs: list[NDArray[Any]] = []
     start = 0

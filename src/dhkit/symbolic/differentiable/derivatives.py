@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dhkit.symbolic.differentiable.composite_bodies import composite_mass_matrix
+from dhkit.symbolic.differentiable.composite_bodies import (
+    composite_coriolis_matrix,
+    composite_mass_matrix,
+)
 from dhkit.symbolic.differentiable.forward_dynamics import (
     recursive_forward_dynamics,
     solve_for_acceleration,
@@ -19,7 +22,10 @@ if TYPE_CHECKING:
 def recursive_inverse_dynamics_derivatives(
     table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX
 ) -> casadi.SX:
-    """Return d tau/dq, d tau/dqd and d tau/dqdd = M below each other, 3 n x n, with drives and without friction.
+    """Return d tau/dq, d tau/dqd and d tau/dqdd below each other, 3 n x n, with drives and without friction.
+
+    Since tau = M qdd + h + g with h_i = sum_jk Gamma_ijk qd_j qd_k and Gamma_ijk = Gamma_ikj, the last two are matrices
+    that have programs of their own: d tau/dqd = 2 C with C_ij = sum_k Gamma_ijk qd_k, and d tau/dqdd = M.
 
     Parameters
     ----------
@@ -46,9 +52,9 @@ def recursive_inverse_dynamics_derivatives(
     """
     import casadi
 
-    tau = recursive_inverse_dynamics(table, q, qd, qdd)
-    by_state = [casadi.jacobian(tau, x) for x in (q, qd)]
-    return casadi.vertcat(*by_state, composite_mass_matrix(table, q))
+    by_position = casadi.jacobian(recursive_inverse_dynamics(table, q, qd, qdd), q)
+    by_rate = 2 * composite_coriolis_matrix(table, q, qd)
+    return casadi.vertcat(by_position, by_rate, composite_mass_matrix(table, q))
 
 
 def recursive_forward_dynamics_derivatives(
@@ -88,13 +94,13 @@ def recursive_forward_dynamics_derivatives(
 
     n = q.shape[0]
     qdd = casadi.SX.sym("qdd", n)
-    inverse = recursive_inverse_dynamics(table, q, qd, qdd)
-    by_state = casadi.horzcat(casadi.jacobian(inverse, q), casadi.jacobian(inverse, qd))
-    at_qdd = casadi.substitute(by_state, qdd, recursive_forward_dynamics(table, q, qd, tau))
+    by_position = casadi.jacobian(recursive_inverse_dynamics(table, q, qd, qdd), q)
+    at_qdd = casadi.substitute(by_position, qdd, recursive_forward_dynamics(table, q, qd, tau))
+    by_rate = 2 * composite_coriolis_matrix(table, q, qd)
 
     # The factors of M occur in every column; a program computes equal operations once.
     M = composite_mass_matrix(table, q)
-    right_sides = casadi.horzcat(-at_qdd, casadi.SX.eye(n))
+    right_sides = casadi.horzcat(-at_qdd, -by_rate, casadi.SX.eye(n))
     columns = [solve_for_acceleration(M, right_sides[:, k]) for k in range(3 * n)]
     blocks = [casadi.horzcat(*columns[k * n : (k + 1) * n]) for k in range(3)]
     return casadi.vertcat(*blocks)
