@@ -6,6 +6,12 @@ from benchmarks.targets import main
 
 if __name__ == "__main__":
     main(
-        ("inverse_dynamics", "mass_matrix", "forward_dynamics"),
+        (
+            "inverse_dynamics",
+            "mass_matrix",
+            "forward_dynamics",
+            "inverse_dynamics_derivatives",
+            "regressor",
+        ),
         Path(__file__).parent / "results" / "dynamics",
     )

@@ -16,9 +16,6 @@ from dhkit.bench.peers import eaik, pinocchio
 from dhkit.bench.runner import REPEATS
 from dhkit.cli.bench import run
 
-PIN_CALL = 0.25
-"""Time of a pin.forwardKinematics call, µs, on the machine that the target for a single call is stated for."""
-
 
 @dataclass(frozen=True)
 class _Comparison:
@@ -33,6 +30,18 @@ class _Comparison:
     target: float | None = None
 
 
+def _single(quantity: str, peer: str, required: float) -> _Comparison:
+    """Return the target for a single call, as a share of a peer's, see issue 21's table of both on one machine."""
+    return _Comparison(
+        quantity,
+        f"a single call over {peer}",
+        peer,
+        required,
+        lambda row: 1 / row.times_single if row.times_single else None,
+        at_most=True,
+    )
+
+
 MAX_DERIVATION_TIMES = {CASADI: 0.5, PROOFS: 5.0}
 """Longest times of derivations, s, by name."""
 COMPARISONS = (
@@ -44,14 +53,7 @@ COMPARISONS = (
         lambda row: row.times_batch,
         target=12.0,
     ),
-    _Comparison(
-        "fk",
-        f"µs a single call where Pinocchio's takes {PIN_CALL:g} µs",
-        pinocchio.FORWARD,
-        10.0,
-        lambda row: PIN_CALL / row.times_single if row.times_single else None,
-        at_most=True,
-    ),
+    _single("fk", pinocchio.FORWARD, 1.07),
     _Comparison(
         "ik",
         "times EAIK's batch call, all branches",
@@ -60,13 +62,28 @@ COMPARISONS = (
         lambda row: row.times_batch,
         target=20.0,
     ),
+    _single("ik", eaik.SINGLE, 0.56),
+    _single("jacobian", pinocchio.FRAME_JACOBIAN, 0.7),
+    _single("inverse_dynamics", pinocchio.RNEA, 0.45),
+    _single("mass_matrix", pinocchio.CRBA, 0.57),
+    _single("forward_dynamics", pinocchio.ABA, 0.33),
+    _single("inverse_dynamics_derivatives", pinocchio.DERIVATIVES, 0.41),
+    _single("regressor", pinocchio.REGRESSOR, 0.44),
     _Comparison(
-        "ik",
-        "a single call over EAIK's single call",
-        eaik.SINGLE,
-        3.0,
-        lambda row: 1 / row.times_single if row.times_single else None,
-        at_most=True,
+        "inverse_dynamics_derivatives",
+        "times a loop over pin.computeRNEADerivatives",
+        pinocchio.DERIVATIVES,
+        5.8,
+        lambda row: row.times_batch,
+        target=19.0,
+    ),
+    _Comparison(
+        "regressor",
+        "times a loop over pin.computeJointTorqueRegressor",
+        pinocchio.REGRESSOR,
+        2.1,
+        lambda row: row.times_batch,
+        target=9.0,
     ),
     _Comparison(
         "jacobian",

@@ -55,6 +55,12 @@ def in_one_array(function, *arguments, **options):
     return np.stack(function(*arguments, **options), axis=-3)
 
 
+def stacked(function, *arguments):
+    """Return a fast function's result, with derivatives as one array."""
+    found = function(*arguments)
+    return np.stack(found, axis=-3) if isinstance(found, tuple) else found
+
+
 def called(arm, method):
     """Return a method of an arm, with derivatives as one array."""
     function = getattr(arm, method)
@@ -82,9 +88,10 @@ def test_values_are_those_of_the_ordinary_way(name, law):
     rng = np.random.default_rng(0)
     for method, count in STATES.items():
         fast = getattr(arm._calls, method)
-        if not is_builtin(fast):
+        if fast is single_calls.never:
             assert not all(joint.bodies for joint in arm.description.joints)
             continue
+        fast = partial(stacked, fast)
         for items in (None, 1, 2, 7, MAX_ITEMS):
             shape = (arm.n,) if items is None else (items, arm.n)
             for _ in range(law.samples(200, quick=3)):
@@ -92,11 +99,12 @@ def test_values_are_those_of_the_ordinary_way(name, law):
                 expected = ordinary(method)(arm, *states)
                 found = fast(*states, None)
                 assert found is not None and found.shape == expected.shape
-                assert found.flags.c_contiguous and found.flags.owndata
+                assert found.flags.c_contiguous
                 scale = np.abs(expected).max(initial=1.0)
                 law.holds(method, np.abs(found - expected).max() / scale, 1e-11)
                 out = np.empty_like(expected)
-                assert fast(*states, out) is out
+                filled = fast(*states, out)
+                assert method.endswith("derivatives") or filled is out
                 assert np.array_equal(out, found)
 
 
@@ -108,7 +116,7 @@ def test_random_arms(description):
     for method, count in STATES.items():
         states = (q, qd, qdd)[:count]
         expected = ordinary(method)(arm, *states)
-        found = getattr(arm._calls, method)(*states, None)
+        found = stacked(getattr(arm._calls, method), *states, None)
         if found is None:
             assert method == "forward_dynamics" and not np.isfinite(expected).all()
         else:

@@ -1613,12 +1613,12 @@ class Arm:
         array([[0.9217, 0.23  ],
                [0.23  , 0.08  ]])
         """
-        from dhkit.dynamics import InverseDynamicsDerivatives, inverse_dynamics_derivatives
-
         if threads == 1:
-            stacked = self._calls.inverse_dynamics_derivatives(q, qd, qdd, out)
-            if stacked is not None:
-                return InverseDynamicsDerivatives.of(stacked)
+            found = self._calls.inverse_dynamics_derivatives(q, qd, qdd, out)
+            if found is not None:
+                return found
+        from dhkit.dynamics import inverse_dynamics_derivatives
+
         return inverse_dynamics_derivatives(self._description, q, qd, qdd, out, threads)
 
     def forward_dynamics_derivatives(
@@ -1660,12 +1660,12 @@ class Arm:
         array([[  3.842, -11.046],
                [-11.046,  44.256]])
         """
-        from dhkit.dynamics import ForwardDynamicsDerivatives, forward_dynamics_derivatives
-
         if threads == 1:
-            stacked = self._calls.forward_dynamics_derivatives(q, qd, tau, out)
-            if stacked is not None:
-                return ForwardDynamicsDerivatives.of(stacked)
+            found = self._calls.forward_dynamics_derivatives(q, qd, tau, out)
+            if found is not None:
+                return found
+        from dhkit.dynamics import forward_dynamics_derivatives
+
         return forward_dynamics_derivatives(self._description, q, qd, tau, out, threads)
 
     @cached_property

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from dhkit.description import Array, Description
+from dhkit.dynamics.derivatives import ForwardDynamicsDerivatives, InverseDynamicsDerivatives
 from dhkit.dynamics.programs import dynamics_kernel
 from dhkit.dynamics.regressor import regressor_kernel
 from dhkit.errors import DescriptionError
@@ -25,6 +26,8 @@ class _Quantity(NamedTuple):
     tail: Callable[[int], tuple[int, ...]]
     """Axes of the result after those of the batch, for n joints."""
     refuses_nan: bool = False
+    result_of: Callable[[Array], Any] | None = None
+    """What the arm's method returns, from the function's array; the array itself if None."""
 
 
 def _dynamic(
@@ -44,12 +47,30 @@ _QUANTITIES: Mapping[str, _Quantity] = {
     "bias": _dynamic("bias", lambda n: (n,)),
     "inverse_dynamics": _dynamic("inverse_dynamics", lambda n: (n,)),
     "regressor": _Quantity(regressor_kernel, lambda n: (n, 10 * n)),
-    "inverse_dynamics_derivatives": _dynamic("inverse_dynamics_derivatives", lambda n: (3, n, n)),
-    "forward_dynamics_derivatives": _dynamic("forward_dynamics_derivatives", lambda n: (3, n, n)),
+    "inverse_dynamics_derivatives": _Quantity(
+        partial(dynamics_kernel, "inverse_dynamics_derivatives"),
+        lambda n: (3, n, n),
+        result_of=InverseDynamicsDerivatives.of,
+    ),
+    "forward_dynamics_derivatives": _Quantity(
+        partial(dynamics_kernel, "forward_dynamics_derivatives"),
+        lambda n: (3, n, n),
+        result_of=ForwardDynamicsDerivatives.of,
+    ),
     # The ordinary way says why an acceleration is missing.
     "forward_dynamics": _dynamic("forward_dynamics", lambda n: (n,), refuses_nan=True),
 }
 """Quantities by the name of the arm's method, for its default options."""
+
+
+def _with_result(call: FastCall, result_of: Callable[[Array], Any]) -> FastCall:
+    """Return a function whose results are made from the arrays of another one."""
+
+    def converted(*arguments: object) -> Any:
+        array = call(*arguments)
+        return None if array is None else result_of(array)
+
+    return converted
 
 
 class ArmCalls:
@@ -69,8 +90,8 @@ class ArmCalls:
     inverse_dynamics: ArrayCall
     forward_dynamics: ArrayCall
     regressor: ArrayCall
-    inverse_dynamics_derivatives: ArrayCall
-    forward_dynamics_derivatives: ArrayCall
+    inverse_dynamics_derivatives: Callable[..., InverseDynamicsDerivatives | None]
+    forward_dynamics_derivatives: Callable[..., ForwardDynamicsDerivatives | None]
     ik: PoseCallLike
 
     def __init__(self, description: Description) -> None:
@@ -104,6 +125,12 @@ class ArmCalls:
         """Return the number of quantities."""
         return len(_QUANTITIES) + 1
 
+    def _install(self, name: str, call: FastCall) -> None:
+        result_of = _QUANTITIES[name].result_of
+        if result_of is not None and call is not never:
+            call = _with_result(call, result_of)
+        setattr(self, name, call)
+
     def _single_call(self, name: str) -> SingleCall | None:
         """Return a quantity that is not compiled yet; None of dynamics without bodies, whose ordinary way says so."""
         quantity = _QUANTITIES[name]
@@ -115,6 +142,6 @@ class ArmCalls:
             kernel,
             parameters,
             quantity.tail(self._description.n),
-            install=partial(setattr, self, name),
+            install=partial(self._install, name),
             refuses_nan=quantity.refuses_nan,
         )

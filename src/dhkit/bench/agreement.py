@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -55,8 +56,13 @@ def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
     answers = task.answers(count)
     if quantity == "ik":
         return _judge_solutions(workload, answers)
-    ours = getattr(workload.arm, quantity)(*(x[:count] for x in workload.inputs(quantity)))
+    ours = stacked(getattr(workload.arm, quantity)(*(x[:count] for x in workload.inputs(quantity))))
     return Verdict(_worst((np.asarray(answers) - ours) / max(1.0, float(np.abs(ours).max()))))
+
+
+def stacked(result: Any) -> Array:
+    """Return a quantity of N items with N as its first axis: derivatives, which are three arrays, as (N, 3, n, n)."""
+    return np.stack(result, axis=-3) if isinstance(result, tuple) else np.asarray(result)
 
 
 def _judge_solutions(workload: Workload, answers: Sequence[Array]) -> Verdict:

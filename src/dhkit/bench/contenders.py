@@ -18,7 +18,16 @@ from dhkit.display import counted, repr_line
 from dhkit.errors import from_checkout
 from dhkit.verification import random_states
 
-QUANTITIES = ("fk", "ik", "jacobian", "inverse_dynamics", "mass_matrix", "forward_dynamics")
+QUANTITIES = (
+    "fk",
+    "ik",
+    "jacobian",
+    "inverse_dynamics",
+    "mass_matrix",
+    "forward_dynamics",
+    "inverse_dynamics_derivatives",
+    "regressor",
+)
 """Quantities that are timed; each is the name of a method of :class:`dhkit.Arm`."""
 
 Call: TypeAlias = Callable[[], object]
@@ -33,6 +42,8 @@ class Mode(Enum):
 
     SINGLE = "single"
     """One call for each item, from a Python loop."""
+    FEW = "few"
+    """One call for a few items, from a Python loop."""
     BATCH = "batch"
     """One call for all items."""
 
@@ -83,7 +94,7 @@ class Workload:
         match quantity:
             case "ik":
                 return (self.T,)
-            case "inverse_dynamics":
+            case "inverse_dynamics" | "inverse_dynamics_derivatives" | "regressor":
                 return self.q, self.qd, self.qdd
             case "forward_dynamics":
                 return self.q, self.qd, self.tau
@@ -104,7 +115,8 @@ class Task:
         Returns the call that is timed, for a number of items; work that a user does only once is done here.
     answers
         Returns the results of the first k items in dhkit's conventions: of each item fk (4, 4), jacobian (6, n),
-        ik (solutions, n), torques and accelerations (n,), mass_matrix (n, n).
+        ik (solutions, n), torques and accelerations (n,), mass_matrix (n, n), derivatives (3, n, n), regressor
+        (n, 10 n).
     """
 
     prepare: Callable[[int], Call]

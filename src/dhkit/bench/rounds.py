@@ -13,8 +13,10 @@ import numpy as np
 from dhkit.bench.contenders import Call, Mode, Task
 from dhkit.description import Array
 
-BUDGET = {Mode.SINGLE: 0.05, Mode.BATCH: 1.0}
-"""Time of a contender in a round, s: a short loop of single calls is as informative as a long one."""
+BUDGET = {Mode.SINGLE: 0.05, Mode.FEW: 0.05, Mode.BATCH: 1.0}
+"""Time of a contender in a round, s: a short loop of calls is as informative as a long one."""
+FEWEST = 64
+"""Smallest number of items of a contender that takes several in a call."""
 MIN_TIMING = 0.02
 """Shortest timing of repeated calls, s: with it caches are equally warm for all, and the first call does not decide."""
 
@@ -45,7 +47,7 @@ def _seconds_of(call: Call) -> float:
 
 def items_within(task: Task, mode: Mode, max_items: int) -> int:
     """Return how many items fit into a round, at most ``max_items``; this warms the contender up as well."""
-    items = min(max_items, 1 if mode is Mode.SINGLE else 64)
+    items = min(max_items, 1 if mode is Mode.SINGLE else FEWEST)
     while True:
         call = task.prepare(items)
         _seconds_of(call)

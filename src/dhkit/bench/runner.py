@@ -34,7 +34,7 @@ from dhkit.bench.probes import (
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
-_DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
+_DYNAMICS = set(QUANTITIES) - {"fk", "ik", "jacobian"}
 """Quantities with which derivations are timed too."""
 _MAX_DERIVATION_TIME = 90.0
 """Longest time of a peer's derivation, s: nobody would wait longer."""

@@ -1,13 +1,16 @@
-"""dhkit itself: one call for a batch, with and without an array to write into, and one call for each state."""
+"""dhkit itself: one call for a batch, for a few states, and for one, with and without an array to write into."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
+from dhkit.bench.agreement import stacked
 from dhkit.bench.contenders import (
     QUANTITIES,
     Call,
@@ -20,18 +23,24 @@ from dhkit.bench.contenders import (
 )
 from dhkit.description import Array
 from dhkit.errors import DhkitError
+from dhkit.kinematics import IKSolutions
 
 BATCH = "dhkit, out="
 _NEW_ARRAYS = "dhkit"
 SINGLE = "dhkit, one call"
+SINGLE_INTO_OUT = "dhkit, one call, out="
+FEW = (2, 8, 64)
+"""Sizes of small batches."""
 
 
 def contenders() -> tuple[Contender, ...]:
     """Return dhkit's contenders for each quantity."""
-    setups = (
+    setups: tuple[tuple[str, Mode, Callable[[str], Callable[[Workload], Task]]], ...] = (
         (BATCH, Mode.BATCH, _into_out),
         (_NEW_ARRAYS, Mode.BATCH, _into_new_arrays),
         (SINGLE, Mode.SINGLE, _single),
+        (SINGLE_INTO_OUT, Mode.SINGLE, _single_into_out),
+        *((f"dhkit, {size} a call", Mode.FEW, partial(_few, size)) for size in FEW),
     )
     found = []
     for quantity in QUANTITIES:
@@ -62,7 +71,7 @@ def method(arm: Arm, quantity: str) -> Callable[..., Any]:
 def new_output(function: Callable[..., Any], inputs: Sequence[Array]) -> Array:
     """Return an array to write a batch's results into, whose pages are already mapped."""
     result = function(*(x[:1] for x in inputs))
-    one: Array = result if isinstance(result, np.ndarray) else result.q
+    one = result.q if isinstance(result, IKSolutions) else stacked(result)
     return np.full((len(inputs[0]), *one.shape[1:]), np.nan)
 
 
@@ -70,10 +79,7 @@ def _into_out(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
         function = method(workload.arm, quantity)
         inputs = workload.inputs(quantity)
-        if quantity == "ik" and workload.arm.family.fit is None:
-            raise UnavailableError(
-                "arm.ik takes out= only where a closed form decides how many branches there are"
-            )
+        _refuse_open_form(workload, quantity)
 
         def prepare(items: int) -> Callable[[], Any]:
             chosen = [x[:items] for x in inputs]
@@ -106,35 +112,111 @@ def _single(quantity: str) -> Callable[[Workload], Task]:
         items = list(zip(*inputs, strict=True))
 
         def first_answers(count: int) -> list[Array]:
-            """Return the answers to the first items, each called as a batch of one."""
-            found = []
-            for item in items[:count]:
-                batch_of_one = [x[None] for x in item]
-                found.append(_answers(quantity, function(*batch_of_one))[0])
-            return found
+            return [_answer(function(*item)) for item in items[:count]]
 
         return Task(one_by_one(function, items), first_answers)
 
     return setup
 
 
+def _single_into_out(quantity: str) -> Callable[[Workload], Task]:
+    def setup(workload: Workload) -> Task:
+        _refuse_open_form(workload, quantity)
+        function = method(workload.arm, quantity)
+        inputs = workload.inputs(quantity)
+        items = list(zip(*inputs, strict=True))
+        out = new_output(function, [x[:1] for x in inputs])[0]
+
+        def prepare(count: int) -> Call:
+            chosen = list(islice(cycle(items), count))
+
+            def loop() -> None:
+                for item in chosen:
+                    function(*item, out=out)
+
+            return loop
+
+        def first_answers(count: int) -> list[Array]:
+            return [np.copy(_answer(function(*item, out=out))) for item in items[:count]]
+
+        return Task(prepare, first_answers)
+
+    return setup
+
+
+def _few(size: int, quantity: str) -> Callable[[Workload], Task]:
+    """Return the setup of calls for ``size`` states each, in new arrays."""
+
+    def setup(workload: Workload) -> Task:
+        function = method(workload.arm, quantity)
+        inputs = workload.inputs(quantity)
+        count = len(inputs[0]) // size
+        if not count:
+            raise UnavailableError(f"the batch has fewer than {size} states")
+        blocks = [tuple(x[k * size : (k + 1) * size] for x in inputs) for k in range(count)]
+
+        def prepare(items: int) -> Call:
+            # As many calls as the items fill, one at least.
+            return one_by_one(function, blocks)(max(1, items // size))
+
+        def first_answers(wanted: int) -> list[Array]:
+            answers: list[Array] = []
+            while len(answers) < wanted and len(answers) < count * size:
+                answers += _answers(quantity, function(*blocks[len(answers) // size]))
+            return answers[:wanted]
+
+        return Task(prepare, first_answers)
+
+    return setup
+
+
+def _refuse_open_form(workload: Workload, quantity: str) -> None:
+    if quantity == "ik" and workload.arm.family.fit is None:
+        raise UnavailableError(
+            "arm.ik takes out= only where a closed form decides how many branches there are"
+        )
+
+
 def _answers(quantity: str, result: Any) -> Sequence[Array]:
     if quantity != "ik":
-        return list(result)
+        return list(stacked(result))
     return [q[valid] for q, valid in zip(result.q, result.valid, strict=True)]
+
+
+def _answer(result: Any) -> Array:
+    """Return the answer of a call for one state."""
+    if isinstance(result, IKSolutions):
+        reached: Array = result.q[result.valid]
+        return reached
+    return stacked(result)
 
 
 def casadi_contenders() -> tuple[Contender, ...]:
     """Return CasADi's virtual machine mapped over a batch, for each quantity of dynamics."""
+    functions: dict[str, Callable[[Arm], Any]] = {
+        "inverse_dynamics": lambda arm: arm.casadi.inverse_dynamics,
+        "mass_matrix": lambda arm: arm.casadi.mass_matrix,
+        "forward_dynamics": lambda arm: arm.casadi.forward_dynamics,
+        "inverse_dynamics_derivatives": _casadi_derivatives,
+    }
     return tuple(
-        Contender("CasADi map", quantity, Mode.BATCH, _mapped(quantity))
-        for quantity in ("inverse_dynamics", "mass_matrix", "forward_dynamics")
+        Contender("CasADi map", quantity, Mode.BATCH, _mapped(quantity, function))
+        for quantity, function in functions.items()
     )
 
 
-def _mapped(quantity: str) -> Callable[[Workload], Task]:
+def _casadi_derivatives(arm: Arm) -> Any:
+    """Return the derivatives of the torques by CasADi's own differentiation, n x 3 n."""
+    import casadi
+
+    states = [casadi.SX.sym(name, arm.n) for name in ("q", "qd", "qdd")]
+    tau = arm.casadi.inverse_dynamics(*states)
+    return casadi.Function("derivatives", states, [casadi.jacobian(tau, casadi.vertcat(*states))])
+
+
+def _mapped(quantity: str, function_of: Callable[[Arm], Any]) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
-        function = getattr(workload.arm.casadi, quantity)
+        function = function_of(workload.arm)
         inputs = workload.inputs(quantity)
         n = workload.arm.n
 
@@ -145,11 +227,13 @@ def _mapped(quantity: str) -> Callable[[Workload], Task]:
 
         def answers(k: int) -> list[Array]:
             result = np.array(prepare(k)())
-            return (
-                list(result.T)
-                if result.shape == (n, k)
-                else list(result.reshape(n, k, n).swapaxes(0, 1))
-            )
+            if result.shape == (n, k):
+                return list(result.T)
+            # Matrices of the items beside each other.
+            matrices = result.reshape(n, k, -1).swapaxes(0, 1)
+            if matrices.shape[-1] == n:
+                return list(matrices)
+            return list(np.stack(np.split(matrices, 3, axis=-1), axis=-3))
 
         return Task(prepare, answers)
 

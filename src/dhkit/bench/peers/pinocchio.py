@@ -10,12 +10,19 @@ import numpy as np
 
 from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import_peer
 from dhkit.description import Array
+from dhkit.verification import JointStates
+from dhkit.verification.reference import PinocchioResults
 
 FORWARD = "pin.forwardKinematics"
 JACOBIANS = "pin.computeJointJacobians"
 CRBA = "pin.crba"
 RNEA_BATCH = "pin.rneaInParallel"
 ABA_BATCH = "pin.abaInParallel"
+RNEA = "pin.rnea"
+ABA = "pin.aba"
+FRAME_JACOBIAN = "pin.computeFrameJacobian"
+DERIVATIVES = "pin.computeRNEADerivatives"
+REGRESSOR = "pin.computeJointTorqueRegressor"
 
 
 def contenders() -> tuple[Contender, ...]:
@@ -23,10 +30,8 @@ def contenders() -> tuple[Contender, ...]:
     return (
         Contender(FORWARD, "fk", Mode.SINGLE, _forward),
         Contender(JACOBIANS, "jacobian", Mode.SINGLE, _joint_jacobians),
-        Contender("pin.computeFrameJacobian", "jacobian", Mode.SINGLE, _frame_jacobian),
-        Contender(
-            "pin.rnea", "inverse_dynamics", Mode.SINGLE, _algorithm("rnea", "inverse_dynamics")
-        ),
+        Contender(FRAME_JACOBIAN, "jacobian", Mode.SINGLE, _frame_jacobian),
+        Contender(RNEA, "inverse_dynamics", Mode.SINGLE, _algorithm("rnea", "inverse_dynamics")),
         Contender(
             RNEA_BATCH,
             "inverse_dynamics",
@@ -34,15 +39,15 @@ def contenders() -> tuple[Contender, ...]:
             _in_parallel("rneaInParallel", "inverse_dynamics"),
         ),
         Contender(CRBA, "mass_matrix", Mode.SINGLE, _algorithm("crba", "mass_matrix")),
-        Contender(
-            "pin.aba", "forward_dynamics", Mode.SINGLE, _algorithm("aba", "forward_dynamics")
-        ),
+        Contender(ABA, "forward_dynamics", Mode.SINGLE, _algorithm("aba", "forward_dynamics")),
         Contender(
             ABA_BATCH,
             "forward_dynamics",
             Mode.BATCH,
             _in_parallel("abaInParallel", "forward_dynamics"),
         ),
+        Contender(DERIVATIVES, "inverse_dynamics_derivatives", Mode.SINGLE, _derivatives),
+        Contender(REGRESSOR, "regressor", Mode.SINGLE, _regressor),
     )
 
 
@@ -121,6 +126,52 @@ def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
         return Task(prepare, lambda k: [answer(state) for state in states[:k]])
 
     return setup
+
+
+def _derivatives(workload: Workload) -> Task:
+    pin, model, _ = _model(workload)
+    data = model.createData()
+    states = list(zip(*workload.inputs("inverse_dynamics"), strict=True))
+
+    def answer(state: tuple[Array, ...]) -> Array:
+        pin.computeRNEADerivatives(model, data, *state)
+        upper = np.triu(np.reshape(data.M, (model.nv, model.nv)))
+        M = upper + np.triu(upper, 1).T
+        return np.array([np.array(data.dtau_dq), np.array(data.dtau_dv), M])
+
+    return Task(
+        _loop_over(pin.computeRNEADerivatives, model, states),
+        lambda k: [answer(state) for state in states[:k]],
+    )
+
+
+def _regressor(workload: Workload) -> Task:
+    pin, model, _ = _model(workload)
+    states = list(zip(*workload.inputs("regressor"), strict=True))
+
+    def answers(count: int) -> list[Array]:
+        # In the parameters of dhkit, which are about other origins and in another order.
+        motion = JointStates(*(x[:count] for x in workload.inputs("regressor")))
+        return list(PinocchioResults(model, motion).regressor())
+
+    return Task(_loop_over(pin.computeJointTorqueRegressor, model, states), answers)
+
+
+def _loop_over(
+    algorithm: Callable[..., object], model: Any, states: Sequence[tuple[Array, ...]]
+) -> Callable[[int], Call]:
+    data = model.createData()
+
+    def prepare(items: int) -> Call:
+        chosen = list(islice(cycle(states), items))
+
+        def loop() -> None:
+            for state in chosen:
+                algorithm(model, data, *state)
+
+        return loop
+
+    return prepare
 
 
 def _in_parallel(name: str, quantity: str) -> Callable[[Workload], Task]:
