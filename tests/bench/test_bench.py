@@ -229,8 +229,8 @@ def test_dhkits_inverse_kinematics_is_asked_the_same_way(monkeypatch):
             int(np.argmin(np.abs(workload.T - pose).sum(axis=(1, 2))))
             for pose in np.reshape(T, (-1, 4, 4))
         ]
-        q = np.full((len(index), 2, arm.n), np.nan) if out is None else out
-        q[:, 0] = workload.q[index]
+        q = np.full((*T.shape[:-2], 2, arm.n), np.nan) if out is None else out
+        q[..., 0, :] = workload.q[index].reshape(*T.shape[:-2], arm.n)
         return SimpleNamespace(q=q, valid=~np.isnan(q).any(axis=-1))
 
     monkeypatch.setattr(Arm, "ik", ik, raising=False)

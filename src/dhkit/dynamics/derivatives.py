@@ -25,8 +25,8 @@ class InverseDynamicsDerivatives(NamedTuple):
     @classmethod
     def of(cls, stacked: Array) -> InverseDynamicsDerivatives:
         """Return views of the three derivatives in one array, shape (..., 3, n, n), units as above."""
-        # The first axis of one state's array is that of the derivatives, and taking it apart is quicker.
-        return cls(*(stacked if stacked.ndim == 3 else np.moveaxis(stacked, -3, 0)))
+        by_derivative = stacked if stacked.ndim == 3 else np.moveaxis(stacked, -3, 0)
+        return cls(by_derivative[0], by_derivative[1], by_derivative[2])
 
     def __repr__(self) -> str:
         return _line(self)
@@ -45,8 +45,8 @@ class ForwardDynamicsDerivatives(NamedTuple):
     @classmethod
     def of(cls, stacked: Array) -> ForwardDynamicsDerivatives:
         """Return views of the three derivatives in one array, shape (..., 3, n, n), units as above."""
-        # The first axis of one state's array is that of the derivatives, and taking it apart is quicker.
-        return cls(*(stacked if stacked.ndim == 3 else np.moveaxis(stacked, -3, 0)))
+        by_derivative = stacked if stacked.ndim == 3 else np.moveaxis(stacked, -3, 0)
+        return cls(by_derivative[0], by_derivative[1], by_derivative[2])
 
     def __repr__(self) -> str:
         return _line(self)

@@ -23,7 +23,6 @@ from dhkit.bench.contenders import (
 )
 from dhkit.description import Array
 from dhkit.errors import DhkitError
-from dhkit.kinematics import IKSolutions
 
 BATCH = "dhkit, out="
 _NEW_ARRAYS = "dhkit"
@@ -71,7 +70,7 @@ def method(arm: Arm, quantity: str) -> Callable[..., Any]:
 def new_output(function: Callable[..., Any], inputs: Sequence[Array]) -> Array:
     """Return an array to write a batch's results into, whose pages are already mapped."""
     result = function(*(x[:1] for x in inputs))
-    one = result.q if isinstance(result, IKSolutions) else stacked(result)
+    one = stacked(result) if isinstance(result, np.ndarray | tuple) else result.q
     return np.full((len(inputs[0]), *one.shape[1:]), np.nan)
 
 
@@ -112,7 +111,7 @@ def _single(quantity: str) -> Callable[[Workload], Task]:
         items = list(zip(*inputs, strict=True))
 
         def first_answers(count: int) -> list[Array]:
-            return [_answer(function(*item)) for item in items[:count]]
+            return [_answer(quantity, function(*item)) for item in items[:count]]
 
         return Task(one_by_one(function, items), first_answers)
 
@@ -137,7 +136,7 @@ def _single_into_out(quantity: str) -> Callable[[Workload], Task]:
             return loop
 
         def first_answers(count: int) -> list[Array]:
-            return [np.copy(_answer(function(*item, out=out))) for item in items[:count]]
+            return [np.copy(_answer(quantity, function(*item, out=out))) for item in items[:count]]
 
         return Task(prepare, first_answers)
 
@@ -150,10 +149,10 @@ def _few(size: int, quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
         function = method(workload.arm, quantity)
         inputs = workload.inputs(quantity)
-        count = len(inputs[0]) // size
-        if not count:
-            raise UnavailableError(f"the batch has fewer than {size} states")
-        blocks = [tuple(x[k * size : (k + 1) * size] for x in inputs) for k in range(count)]
+        # The last block is filled with the first states.
+        count = -(-len(inputs[0]) // size)
+        filled = [np.resize(x, (count * size, *x.shape[1:])) for x in inputs]
+        blocks = [tuple(x[k * size : (k + 1) * size] for x in filled) for k in range(count)]
 
         def prepare(items: int) -> Call:
             # As many calls as the items fill, one at least.
@@ -161,8 +160,8 @@ def _few(size: int, quantity: str) -> Callable[[Workload], Task]:
 
         def first_answers(wanted: int) -> list[Array]:
             answers: list[Array] = []
-            while len(answers) < wanted and len(answers) < count * size:
-                answers += _answers(quantity, function(*blocks[len(answers) // size]))
+            for block in islice(cycle(blocks), -(-wanted // size)):
+                answers += _answers(quantity, function(*block))
             return answers[:wanted]
 
         return Task(prepare, first_answers)
@@ -183,12 +182,12 @@ def _answers(quantity: str, result: Any) -> Sequence[Array]:
     return [q[valid] for q, valid in zip(result.q, result.valid, strict=True)]
 
 
-def _answer(result: Any) -> Array:
+def _answer(quantity: str, result: Any) -> Array:
     """Return the answer of a call for one state."""
-    if isinstance(result, IKSolutions):
-        reached: Array = result.q[result.valid]
-        return reached
-    return stacked(result)
+    if quantity != "ik":
+        return stacked(result)
+    reached: Array = result.q[result.valid]
+    return reached
 
 
 def casadi_contenders() -> tuple[Contender, ...]:
