@@ -258,6 +258,8 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
     arguments = {
         "ik": "arm.fk(q)",
         "inverse_dynamics": "q, q, q",
+        "inverse_dynamics_derivatives": "q, q, q",
+        "regressor": "q, q, q",
         "forward_dynamics": "q, q, q",
     }.get(quantity, "q")
     code = (

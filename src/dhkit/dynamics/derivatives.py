@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, takes_robot
@@ -25,8 +24,9 @@ class InverseDynamicsDerivatives(NamedTuple):
     @classmethod
     def of(cls, stacked: Array) -> InverseDynamicsDerivatives:
         """Return views of the three derivatives in one array, shape (..., 3, n, n), units as above."""
-        by_derivative = stacked if stacked.ndim == 3 else np.moveaxis(stacked, -3, 0)
-        return cls(by_derivative[0], by_derivative[1], by_derivative[2])
+        if stacked.ndim == 3:
+            return cls(stacked[0], stacked[1], stacked[2])
+        return cls(stacked[..., 0, :, :], stacked[..., 1, :, :], stacked[..., 2, :, :])
 
     def __repr__(self) -> str:
         return _line(self)
@@ -45,8 +45,9 @@ class ForwardDynamicsDerivatives(NamedTuple):
     @classmethod
     def of(cls, stacked: Array) -> ForwardDynamicsDerivatives:
         """Return views of the three derivatives in one array, shape (..., 3, n, n), units as above."""
-        by_derivative = stacked if stacked.ndim == 3 else np.moveaxis(stacked, -3, 0)
-        return cls(by_derivative[0], by_derivative[1], by_derivative[2])
+        if stacked.ndim == 3:
+            return cls(stacked[0], stacked[1], stacked[2])
+        return cls(stacked[..., 0, :, :], stacked[..., 1, :, :], stacked[..., 2, :, :])
 
     def __repr__(self) -> str:
         return _line(self)

@@ -140,8 +140,8 @@ def call_source(
     of the result's shape. The result is ``out`` or a new array; None of arguments that are not taken, which stay
     unchanged. Results are NaN by the rule of :func:`dhkit.kernels.llvm_source.llvm_source`.
 
-    Of a program with several outputs, the first one is that array, and the others are the content of a ``bytes`` object
-    one after the other; the result is the pair of both, and a batch is not taken.
+    Of a program with several outputs, the first one is that array, and the others are the content of a ``bytes``
+    object, item after item. The result is the pair of both.
 
     Parameters
     ----------
@@ -231,6 +231,7 @@ def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
     """Return the lines of ``call``."""
     shapes = state_shapes(graph)
     is_packing = len(types) > 1
+    item_bytes = 0
     function = _Function()
     function.add(f"%has_count = icmp eq i64 %count, {len(shapes) + 1}")
     function.require("%has_count")
@@ -247,7 +248,7 @@ def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
         "%batch_axes_wide = zext i32 %batch_axes to i64",
         "%x0_has_first_axis = icmp sgt i32 %x0_axes, 0",
     )
-    function.require("%is_single" if is_packing else "%x0_has_first_axis")
+    function.require("%x0_has_first_axis")
     function.add(
         "%x0_first_size = load i64, ptr %x0_shape",
         "%items = select i1 %is_single, i64 1, i64 %x0_first_size",
@@ -298,9 +299,10 @@ def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
     function.load("y", "ptr", "%array", DATA_OFFSET)
     if is_packing:
         variables = zip(types[1:], graph.outputs[1:], strict=True)
-        size = sum(_BYTES[kind] * variable.size for kind, variable in variables)
+        item_bytes = sum(_BYTES[kind] * variable.size for kind, variable in variables)
         function.add(
-            f"%bytes = call ptr %PyBytes_FromStringAndSize(ptr null, i64 {size})",
+            f"%byte_count = mul i64 %items, {item_bytes}",
+            "%bytes = call ptr %PyBytes_FromStringAndSize(ptr null, i64 %byte_count)",
             "%has_no_bytes = icmp eq ptr %bytes, null",
             "br i1 %has_no_bytes, label %failed_after_array, label %with_bytes",
         )
@@ -326,7 +328,13 @@ def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
             f"%{name}_item = getelementptr double, ptr {pointer}, i64 %{name}_offset",
         )
     items = ", ".join(f"ptr %x{k}_item" for k in range(len(shapes)))
-    packed = "%packed" if is_packing else "null"
+    packed = "null"
+    if is_packing:
+        packed = "%packed_item"
+        function.add(
+            f"%packed_offset = mul i64 %k, {item_bytes}",
+            "%packed_item = getelementptr i8, ptr %packed, i64 %packed_offset",
+        )
     function.add(
         f"%is_done = call i1 @run(ptr %parameters, {items}, ptr %y_item, ptr {packed})",
         "br i1 %is_done, label %computed, label %refused",

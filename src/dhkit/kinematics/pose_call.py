@@ -14,12 +14,12 @@ from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_of
 
 _NO_SEED = np.zeros(2)
 """Angles of free joints without a seed, rad."""
-_REACHED = bytes(8)
-"""The distance 0.0 as it begins the packed outputs."""
+_ZERO = bytes(8)
+"""The distance 0.0 m, with which the packed outputs of a pose that is reached begin."""
 
 
 class PoseCall:
-    """All solutions of one pose T (4, 4) of an arm with a closed form, or None of what it does not take."""
+    """All solutions of one pose or a few of an arm with a closed form, or None of what it does not take."""
 
     def __init__(self, description: Description, solver: Solver) -> None:
         self._shared = {
@@ -28,13 +28,14 @@ class PoseCall:
             "description": description,
             "complete": True,
         }
+        B = len(solver.fit.branches)
         # The ordinary way corrects the kernel's distance of poses beyond reach.
         self._needs_reach = has_offset_wrist(solver.fit)
         middle = np.arange(1.0, description.n + 1.0) / description.n
         self._call: FastCall = SingleCall(
             solver.kernel,
             solver.parameters,
-            (len(solver.fit.branches), description.n),
+            (B, description.n),
             install=self._install,
             example=[world_to_tool(description, middle), _NO_SEED],
         )
@@ -53,20 +54,32 @@ class PoseCall:
         Parameters
         ----------
         T
-            Pose of the tool in the world, shape (4, 4), m.
+            Poses of the tool in the world, shape (4, 4), or (N, 4, 4) with few of them, m.
         out
-            Array for the joint values, shape (B, n), rad and m.
+            Array for the joint values, shape (..., B, n), rad and m.
         """
-        if self._needs_reach and out is not None:
-            # It may lie where T lies, which the ordinary way would still need.
+        no_seed = _NO_SEED
+        if type(T) is np.ndarray and T.ndim == 3:
+            no_seed = np.zeros((len(T), 2))
+        if self._needs_reach and out is not None and _may_share_memory(T, out):
+            # The ordinary way may still need T.
             return None
-        found = self._call(T, _NO_SEED, out)
+        found = self._call(T, no_seed, out)
         if found is None:
             return None
         q, packed = found
-        if self._needs_reach and not packed.startswith(_REACHED):
-            return None
-        return IKSolutions.of_one_pose(q, packed, self._shared)
+        solutions = IKSolutions.of_packed(q, packed, self._shared)
+        if self._needs_reach:
+            is_single = q.ndim == 2
+            is_reached = packed.startswith(_ZERO) if is_single else not solutions.distance.any()
+            if not is_reached:
+                return None
+        return solutions
+
+
+def _may_share_memory(T: Any, out: Any) -> bool:
+    are_arrays = isinstance(T, np.ndarray) and isinstance(out, np.ndarray)
+    return not are_arrays or np.may_share_memory(T, out)
 
 
 def pose_call(description: Description) -> PoseCall | None:

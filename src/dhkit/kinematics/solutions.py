@@ -85,15 +85,15 @@ class IKSolutions:
     iteration, which may miss some."""
 
     @classmethod
-    def of_one_pose(cls, q: Array, packed: bytes, shared: Mapping[str, object]) -> IKSolutions:
-        """Return the solutions of one pose, whose other arrays are made when one of them is first read.
+    def of_packed(cls, q: Array, packed: bytes, shared: Mapping[str, object]) -> IKSolutions:
+        """Return the solutions of few poses, whose other arrays are made when one of them is first read.
 
         Parameters
         ----------
         q
-            Joint values, shape (B, n), rad and m.
+            Joint values, shape (B, n) or (N, B, n), rad and m.
         packed
-            ``distance`` as a double, then B bytes of ``valid``, B of ``flags``, and ``status_code``.
+            Of each pose ``distance`` as a double, then B bytes of ``valid``, B of ``flags``, and ``status_code``.
         shared
             The fields that are not arrays, by name.
         """
@@ -103,17 +103,21 @@ class IKSolutions:
         return solutions
 
     def __getattr__(self, name: str) -> Any:
-        """Return a field of :meth:`of_one_pose` that is read for the first time."""
+        """Return a field of :meth:`of_packed` that is read for the first time."""
         packed = self.__dict__.get("_packed")
         if packed is None or name not in ("distance", "valid", "flags", "status_code"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        B = len(self.branches)
-        self.__dict__.update(
-            distance=np.frombuffer(packed, float, 1).reshape(()).copy(),
-            valid=np.frombuffer(packed, np.bool_, B, 8).copy(),
-            flags=np.frombuffer(packed, np.uint8, B, 8 + B).copy(),
-            status_code=np.frombuffer(packed, np.uint8, 1, 8 + 2 * B).reshape(()).copy(),
-        )
+        *batch, B, _ = self.q.shape
+        of_pose = [
+            ("distance", np.float64),
+            ("valid", np.bool_, (B,)),
+            ("flags", np.uint8, (B,)),
+            ("status_code", np.uint8),
+        ]
+        poses = np.frombuffer(packed, of_pose)
+        for field in poses.dtype.names or ():
+            values = poses[field].copy()
+            self.__dict__[field] = values.reshape((*batch, *values.shape[1:]))
         return self.__dict__[name]
 
     @property
