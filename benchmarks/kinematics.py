@@ -5,4 +5,4 @@ from pathlib import Path
 from benchmarks.targets import main
 
 if __name__ == "__main__":
-    main(("fk", "ik", "jacobian"), Path(__file__).parent / "results" / "kinematics")
+    main(("fk", "ik", "ik_numeric", "jacobian"), Path(__file__).parent / "results" / "kinematics")

@@ -63,6 +63,7 @@ COMPARISONS = (
         target=20.0,
     ),
     _single("ik", eaik.SINGLE, 0.56),
+    _single("ik_numeric", "roboticstoolbox ik_LM", 0.045),
     _single("jacobian", pinocchio.FRAME_JACOBIAN, 0.7),
     _single("inverse_dynamics", pinocchio.RNEA, 0.45),
     _single("mass_matrix", pinocchio.CRBA, 0.57),

@@ -547,3 +547,76 @@ def test_unusual_poses_give_the_same_values_and_exceptions(puma, tmp_path):
             assert found == expected
         else:
             assert found.q is out
+
+
+# Numeric inverse kinematics
+
+
+@pytest.mark.parametrize("name", ["panda", "puma560", "cobra600", "stanford", "planar3r"])
+def test_one_pose_is_solved_as_the_ordinary_way_solves_it(name, law):
+    arm = compiled(Arm.load(name))
+    numbers = arm.description.numbers
+    rng = np.random.default_rng(10)
+    lower = np.where(np.isfinite(numbers.lower), numbers.lower, -np.pi)
+    upper = np.where(np.isfinite(numbers.upper), numbers.upper, np.pi)
+    taken = 0
+    different = 0
+    count = law.samples(500, quick=20)
+    for q in rng.uniform(lower, upper, (count, arm.n)):
+        T = arm.fk(q)
+        for q0 in (None, q + 0.05, q + 7.0):
+            found = arm.ik_numeric(T, q0)
+            expected = kinematics.solve_numerically(arm, T, q0)
+            assert (found.status, found.branches) == (expected.status, expected.branches)
+            taken += "_packed" in vars(found)
+            for field in FIELDS:
+                one, other = getattr(found, field), getattr(expected, field)
+                assert (one.shape, one.dtype) == (other.shape, other.dtype)
+            if found.valid.all():
+                assert np.abs(arm.fk(found.q[0]) - T).max() < 1e-11
+                assert ((found.q >= numbers.lower) & (found.q <= numbers.upper)).all()
+                different += not np.allclose(found.q, expected.q, rtol=0, atol=1e-6)
+    assert taken > count
+    # A search that the last bits decide may end at another solution.
+    law.holds("share of other solutions", different / (3 * count), 0.05)
+
+
+def test_poses_that_are_not_found_are_told_by_the_ordinary_way(puma):
+    T = puma.fk(np.linspace(-1, 1, 6))
+    far = T.copy()
+    far[0, 3] = 50.0
+    wrong = T.copy()
+    wrong[:3, :3] *= 1.001
+    for pose in (far, wrong, np.full((4, 4), np.nan), T.tolist(), T[None], T.astype(np.float32)):
+        found = outcome(puma.ik_numeric, pose)
+        expected = outcome(kinematics.solve_numerically, puma, pose)
+        assert np.array_equal(found.status, expected.status)
+        assert np.allclose(found.q, expected.q, rtol=0, atol=1e-6, equal_nan=True)
+    for q0 in ([0.0] * 6, np.full(6, np.nan), np.zeros(5), "ready", np.zeros((2, 6))):
+        found = outcome(puma.ik_numeric, T, q0)
+        expected = outcome(kinematics.solve_numerically, puma, T, q0)
+        if isinstance(expected, tuple):
+            assert found == expected
+        else:
+            assert np.allclose(found.q, expected.q, rtol=0, atol=1e-6)
+    for options in ({"tolerance": -1.0}, {"tolerance": np.nan}, {"seed": -1}, {"restarts": -1}):
+        found = outcome(puma.ik_numeric, T, **options)
+        assert found == outcome(kinematics.solve_numerically, puma, T, **options)
+
+
+def test_few_poses_are_solved_as_the_ordinary_way_solves_them(puma):
+    numbers = puma.description.numbers
+    q = np.random.default_rng(11).uniform(numbers.lower, numbers.upper, (20, 6))
+    T = puma.fk(q)
+    for q0 in (None, np.zeros(6), q + 0.05):
+        found = puma.ik_numeric(T, q0)
+        expected = kinematics.solve_numerically(puma, T, q0)
+        assert "_packed" in vars(found)
+        for field in FIELDS:
+            one, other = getattr(found, field), getattr(expected, field)
+            assert (one.shape, one.dtype) == (other.shape, other.dtype)
+        assert np.allclose(found.q, expected.q, rtol=0, atol=1e-6)
+        assert np.array_equal(found.status, expected.status)
+    some = T.copy()
+    some[3, 0, 3] = 50.0
+    assert puma.ik_numeric(some).status[3] == "out_of_reach"

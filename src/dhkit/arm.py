@@ -878,6 +878,11 @@ class Arm:
         >>> str(found.status), found.q.shape
         ('ok', (1, 7))
         """
+        is_usual = not position_only and limits and restarts == 63 and progress is None
+        if is_usual and threads == 1 and type(tolerance) is float and type(seed) is int:
+            found = self._calls.ik_numeric(T, q0, tolerance, seed)
+            if found is not None:
+                return found
         from dhkit.kinematics import solve_numerically
 
         return solve_numerically(

@@ -14,6 +14,7 @@ from dhkit.errors import DescriptionError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
+from dhkit.kinematics.numeric_call import NumericCall
 from dhkit.kinematics.pose_call import PoseCall, pose_call
 from dhkit.kinematics.solutions import IKSolutions
 
@@ -93,6 +94,7 @@ class ArmCalls:
     inverse_dynamics_derivatives: Callable[..., InverseDynamicsDerivatives | None]
     forward_dynamics_derivatives: Callable[..., ForwardDynamicsDerivatives | None]
     ik: PoseCallLike
+    ik_numeric: PoseCallLike
 
     def __init__(self, description: Description) -> None:
         self._description = description
@@ -102,6 +104,8 @@ class ArmCalls:
         call: FastCall | None
         if name == "ik":
             call = pose_call(self._description)
+        elif name == "ik_numeric":
+            call = NumericCall(self._description)
         elif name in _QUANTITIES:
             call = self._single_call(name)
         else:
@@ -120,10 +124,13 @@ class ArmCalls:
         if isinstance(self.ik, PoseCall):
             self.ik.compile()
         yield "ik"
+        if isinstance(self.ik_numeric, NumericCall):
+            self.ik_numeric.compile()
+        yield "ik_numeric"
 
     def count(self) -> int:
         """Return the number of quantities."""
-        return len(_QUANTITIES) + 1
+        return len(_QUANTITIES) + 2
 
     def _install(self, name: str, call: FastCall) -> None:
         result_of = _QUANTITIES[name].result_of

@@ -20,7 +20,7 @@ from dhkit.kernels.kernel import COMPILE_AFTER, MIN_ITEMS_PER_THREAD, SMALL_BATC
 from dhkit.kernels.llvm_source import BLOCK, llvm_source
 from dhkit.kernels.threads import all_in_threads, in_threads
 from dhkit.kinematics import forward_kinematics, inverse_kinematics, jacobian
-from dhkit.symbolic import Graph
+from dhkit.symbolic import Graph, Loop
 from random_arms import states
 
 TIERS = 1e-14
@@ -311,10 +311,12 @@ def test_no_kernel_calls_anything(name):
     for run in kinematic_kernels(arm) + dynamic_kernels(arm):
         called = {
             line.split("@")[1].split("(")[0]
-            for line in llvm_source(run.program(), run.types).splitlines()
+            for line in run._source(run.program()).splitlines()
             if "call " in line
         }
-        assert called <= {"llvm.fabs.v8f64", "llvm.sqrt.v8f64", "llvm.floor.v8f64"}
+        widths = ("v8f64", "f64")
+        operations = {f"llvm.{name}.{kind}" for name in ("fabs", "sqrt", "floor") for kind in widths}
+        assert called <= operations | {"run"}
 
 
 def test_arms_of_one_pattern_share_a_kernel():
@@ -427,3 +429,55 @@ def test_a_search_for_one_pose_starts_no_compilation(monkeypatch):
     monkeypatch.setattr(Kernel, "_look_up", lambda self: pytest.fail("looked up"))
     for _ in range(3):
         arm.ik_numeric(dhkit.pose((5.0, 0.2, 1.6)))
+
+
+# Loops
+
+
+def newton_root():
+    """Square roots by Heron's steps x <- (x + a / x) / 2 from x = a, until x^2 is near a."""
+    import casadi
+
+    p, a, x, one = (casadi.SX.sym(name) for name in ("p", "a", "x", "one"))
+    inputs = {"parameters": p, "a": a}
+    within = {**inputs, "fixed": one, "state": x}
+    start = Graph.of("heron_start", inputs, {"state": a, "fixed": 0 * a + 1})
+    after = (x + a / x) / 2
+    goes_on = casadi.fabs(after * after - a) > p * a
+    step = Graph.of("heron_step", within, {"state": after, "goes_on": goes_on})
+    finish = Graph.of("heron", within, {"root": x * one, "twice": 2 * x})
+    return Loop(start, step, finish, most=60)
+
+
+@pytest.mark.parametrize("mode", ["on", "off"])
+@pytest.mark.parametrize("count", [1, 2, 1000])
+def test_a_loop_ends_for_each_item_when_it_is_done(mode, count, monkeypatch):
+    set_mode(monkeypatch, mode)
+    run = Kernel("heron", "", newton_root, ("float64", "float64"), is_loop=True)
+    a = np.geomspace(1e-6, 1e6, count)[:, None]
+    root, twice = np.empty((2, count, 1))
+    run(np.array([1e-14]), [a], [root, twice])
+    assert np.abs(root / np.sqrt(a) - 1).max() < 1e-13
+    assert np.array_equal(twice, 2 * root)
+
+
+@pytest.mark.parametrize("mode", ["on", "off"])
+def test_a_loop_is_bounded_and_keeps_what_is_not_finite(mode, monkeypatch):
+    set_mode(monkeypatch, mode)
+    run = Kernel("heron", "", newton_root, ("float64", "float64"), is_loop=True)
+    a = np.array([[2.0], [np.nan], [np.inf], [3.0]])
+    root, twice = np.empty((2, 4, 1))
+    # Never near enough: all steps are taken.
+    run(np.array([-1.0]), [a], [root, twice])
+    assert np.allclose(root[[0, 3], 0], np.sqrt([2.0, 3.0]), rtol=1e-15)
+    assert np.isnan(root[[1, 2], 0]).all()
+
+
+def test_threads_share_a_loop(monkeypatch):
+    set_mode(monkeypatch, "on")
+    run = Kernel("heron", "", newton_root, ("float64", "float64"), is_loop=True)
+    a = np.linspace(1, 9, 20_000)[:, None]
+    once, shared = np.empty((2, 2, 20_000, 1))
+    run(np.array([1e-14]), [a], list(once))
+    run(np.array([1e-14]), [a], list(shared), threads=4)
+    assert np.array_equal(once, shared)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.bench.contenders import Task, Workload
+from dhkit.bench.contenders import INVERSE_KINEMATICS, Task, Workload
 from dhkit.description import Array
 from dhkit.display import value_line
 
@@ -54,8 +54,8 @@ def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
     """Compare the first answers of a task with dhkit's own."""
     count = min(_CHECKED_ITEMS, len(workload.q))
     answers = task.answers(count)
-    if quantity == "ik":
-        return _judge_solutions(workload, answers)
+    if quantity in INVERSE_KINEMATICS:
+        return _judge_solutions(workload, workload.inputs(quantity)[0], answers)
     ours = stacked(getattr(workload.arm, quantity)(*(x[:count] for x in workload.inputs(quantity))))
     return Verdict(_worst((np.asarray(answers) - ours) / max(1.0, float(np.abs(ours).max()))))
 
@@ -65,9 +65,9 @@ def stacked(result: Any) -> Array:
     return np.stack(result, axis=-3) if isinstance(result, tuple) else np.asarray(result)
 
 
-def _judge_solutions(workload: Workload, answers: Sequence[Array]) -> Verdict:
+def _judge_solutions(workload: Workload, T: Array, answers: Sequence[Array]) -> Verdict:
     counts = [len(solutions) for solutions in answers]
-    poses = np.repeat(workload.T[: len(answers)], counts, axis=0)
+    poses = np.repeat(T[: len(answers)], counts, axis=0)
     q = np.concatenate([np.reshape(solutions, (-1, workload.arm.n)) for solutions in answers])
     errors = np.abs(workload.arm.fk(q) - poses)
     if not _meets_whole_poses(workload.arm):

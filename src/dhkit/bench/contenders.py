@@ -21,6 +21,7 @@ from dhkit.verification import random_states
 QUANTITIES = (
     "fk",
     "ik",
+    "ik_numeric",
     "jacobian",
     "inverse_dynamics",
     "mass_matrix",
@@ -29,6 +30,9 @@ QUANTITIES = (
     "regressor",
 )
 """Quantities that are timed; each is the name of a method of :class:`dhkit.Arm`."""
+
+INVERSE_KINEMATICS = ("ik", "ik_numeric")
+"""Quantities whose answers are joint values for a pose."""
 
 Call: TypeAlias = Callable[[], object]
 
@@ -85,6 +89,20 @@ class Workload:
         return self.arm.fk(self.q)
 
     @cached_property
+    def q_inside(self) -> Array:
+        """Joint values inside the limits, and from -pi to pi or -1 to 1 m without, shape (N, n), rad and m."""
+        numbers = self.arm.description.numbers
+        room = np.where(numbers.prismatic, 1.0, np.pi)
+        lower = np.where(np.isfinite(numbers.lower), numbers.lower, -room)
+        upper = np.where(np.isfinite(numbers.upper), numbers.upper, room)
+        return np.random.default_rng(2).uniform(lower, upper, self.q.shape)
+
+    @cached_property
+    def T_inside(self) -> Array:
+        """The tool's poses of ``q_inside``, shape (N, 4, 4), m, world."""
+        return self.arm.fk(self.q_inside)
+
+    @cached_property
     def tau(self) -> Array:
         """The motion's torques, shape (N, n), N m and N."""
         return self.arm.inverse_dynamics(self.q, self.qd, self.qdd)
@@ -94,6 +112,8 @@ class Workload:
         match quantity:
             case "ik":
                 return (self.T,)
+            case "ik_numeric":
+                return (self.T_inside,)
             case "inverse_dynamics" | "inverse_dynamics_derivatives" | "regressor":
                 return self.q, self.qd, self.qdd
             case "forward_dynamics":
@@ -115,8 +135,8 @@ class Task:
         Returns the call that is timed, for a number of items; work that a user does only once is done here.
     answers
         Returns the results of the first k items in dhkit's conventions: of each item fk (4, 4), jacobian (6, n),
-        ik (solutions, n), torques and accelerations (n,), mass_matrix (n, n), derivatives (3, n, n), regressor
-        (n, 10 n).
+        ik and ik_numeric (solutions, n), torques and accelerations (n,), mass_matrix (n, n), derivatives (3, n, n),
+        regressor (n, 10 n).
     """
 
     prepare: Callable[[int], Call]

@@ -257,6 +257,7 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
     method(workload.arm, quantity)
     arguments = {
         "ik": "arm.fk(q)",
+        "ik_numeric": "arm.fk(q)",
         "inverse_dynamics": "q, q, q",
         "inverse_dynamics_derivatives": "q, q, q",
         "regressor": "q, q, q",

@@ -19,7 +19,14 @@ from dhkit.bench.benchmark_report import (
     Requirement,
     Row,
 )
-from dhkit.bench.contenders import QUANTITIES, Call, Contender, UnavailableError, Workload
+from dhkit.bench.contenders import (
+    INVERSE_KINEMATICS,
+    QUANTITIES,
+    Call,
+    Contender,
+    UnavailableError,
+    Workload,
+)
 from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders, dhkit_arm
@@ -34,7 +41,7 @@ from dhkit.bench.probes import (
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
-_DYNAMICS = set(QUANTITIES) - {"fk", "ik", "jacobian"}
+_DYNAMICS = set(QUANTITIES) - {"fk", "jacobian", *INVERSE_KINEMATICS}
 """Quantities with which derivations are timed too."""
 _MAX_DERIVATION_TIME = 90.0
 """Longest time of a peer's derivation, s: nobody would wait longer."""

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import prod
 
-from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER, result_values
-from dhkit.kernels.vectors import EXACT, FUSING, Body, Vector
-from dhkit.symbolic import Graph
+from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER
+from dhkit.kernels.scalar_source import run_source
+from dhkit.symbolic import Graph, Loop
 
 MAX_ITEMS = 64
 """Largest number of items of a call; for larger batches, the vector kernel is faster."""
@@ -124,14 +124,14 @@ class _Function:
             self.require(f"%{name}_has_size{k}")
 
 
-def state_shapes(graph: Graph) -> list[tuple[int, ...]]:
+def state_shapes(program: Graph | Loop) -> list[tuple[int, ...]]:
     """Return the shapes of a program's inputs after the parameters; CasADi's columns are vectors."""
-    shapes = [variable.shape for variable in graph.inputs[1:]]
+    shapes = [variable.shape for variable in program.inputs[1:]]
     return [shape[:1] if shape[1:] == (1,) else shape for shape in shapes]
 
 
 def call_source(
-    graph: Graph, types: Sequence[str], tail: Sequence[int], *, refuses_nan: bool
+    program: Graph | Loop, types: Sequence[str], tail: Sequence[int], *, refuses_nan: bool
 ) -> str:
     """Return a module with ``PyObject *call(PyObject *context, PyObject *const *arguments, Py_ssize_t count)``.
 
@@ -145,7 +145,7 @@ def call_source(
 
     Parameters
     ----------
-    graph
+    program
         A program; its first input holds the parameters.
     types
         Types of its outputs, see :func:`dhkit.kernels.llvm_source.llvm_source`; the first is float64.
@@ -154,83 +154,19 @@ def call_source(
     refuses_nan
         Whether a result with an entry that is not finite counts as arguments that are not taken.
     """
-    return "\n".join([*_program(graph, types, refuses_nan), *_call(graph, types, tail), ""])
-
-
-def _program(graph: Graph, types: Sequence[str], refuses_nan: bool) -> list[str]:
-    """Return the lines of ``run``, which computes one item; of a refused NaN it writes nothing and returns false."""
-    # As in the vector kernel: programs that decide small integers round every operation.
-    body = Body(EXACT if SMALL_INTEGER in types else FUSING, width=1)
-
-    def loaded(pointer: str, size: int) -> list[Vector]:
-        values = []
-        for k in range(size):
-            place = body.define(f"getelementptr double, ptr {pointer}, i64 {k}")
-            values.append(Vector(body, body.define(f"load double, ptr {place}")))
-        return values
-
-    pointers = ["%parameters", *(f"%x{k}" for k in range(len(graph.inputs) - 1))]
-    inputs = [
-        loaded(pointer, variable.size)
-        for pointer, variable in zip(pointers, graph.inputs, strict=True)
-    ]
-    results, *packed = result_values(graph, body, inputs, types)
-    stores = ["  br label %store"]
-    if refuses_nan:
-        # x - x is 0, and NaN where x is not finite.
-        total = results[0] - results[0]
-        for x in results[1:]:
-            total = total + (x - x)
-        stores = [f"  br i1 {total.equals(0.0).name}, label %store, label %refused"]
-    stores.append("store:")
-    for k, result in enumerate(results):
-        stores += [
-            f"  %y{k} = getelementptr double, ptr %y, i64 {k}",
-            f"  store double {result.name}, ptr %y{k}",
-        ]
-    stores += _packed_stores(packed, types[1:])
-    signature = ", ".join(f"ptr {pointer}" for pointer in (*pointers, "%y", "%packed"))
-    return [
-        *body.declarations(),
-        *Body().declarations(),
-        f"define internal i1 @run({signature}) {{",
-        *body.lines,
-        *stores,
-        "  ret i1 true",
-        "refused:",
-        "  ret i1 false",
-        "}",
-    ]
-
-
-def _packed_stores(outputs: Sequence[Sequence[Vector]], types: Sequence[str]) -> list[str]:
-    """Return the lines that write the entries of further outputs one after the other."""
-    lines = []
-    offset = 0
-    for kind, entries in zip(types, outputs, strict=True):
-        for entry in entries:
-            place = f"%packed{offset}"
-            lines.append(f"  {place} = getelementptr i8, ptr %packed, i64 {offset}")
-            if kind == FLOAT:
-                lines.append(f"  store double {entry.name}, ptr {place}, align 1")
-            else:
-                lines += [
-                    f"  {place}_wide = fptosi double {entry.name} to i32",
-                    f"  {place}_small = trunc i32 {place}_wide to i8",
-                    f"  store i8 {place}_small, ptr {place}",
-                ]
-            offset += _BYTES[kind]
-    return lines
+    run = run_source(program, types, refuses_nan=refuses_nan)
+    return "\n".join([*run, *_call(program, types, tail), ""])
 
 
 _BYTES = {FLOAT: 8, SMALL_INTEGER: 1}
 """Sizes of an entry in bytes, by type."""
 
 
-def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
+def _call(program: Graph | Loop, types: Sequence[str], tail: Sequence[int]) -> list[str]:
     """Return the lines of ``call``."""
-    shapes = state_shapes(graph)
+    shapes = state_shapes(program)
     is_packing = len(types) > 1
+    variables = list(zip(types[1:], program.outputs[1:], strict=True))
     item_bytes = 0
     function = _Function()
     function.add(f"%has_count = icmp eq i64 %count, {len(shapes) + 1}")
@@ -298,7 +234,6 @@ def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
     function.add("%array = phi ptr [%out, %use_out], [%new, %allocate]")
     function.load("y", "ptr", "%array", DATA_OFFSET)
     if is_packing:
-        variables = zip(types[1:], graph.outputs[1:], strict=True)
         item_bytes = sum(_BYTES[kind] * variable.size for kind, variable in variables)
         function.add(
             f"%byte_count = mul i64 %items, {item_bytes}",
@@ -328,15 +263,19 @@ def _call(graph: Graph, types: Sequence[str], tail: Sequence[int]) -> list[str]:
             f"%{name}_item = getelementptr double, ptr {pointer}, i64 %{name}_offset",
         )
     items = ", ".join(f"ptr %x{k}_item" for k in range(len(shapes)))
-    packed = "null"
+    outputs = ["ptr %y_item"]
     if is_packing:
-        packed = "%packed_item"
         function.add(
             f"%packed_offset = mul i64 %k, {item_bytes}",
             "%packed_item = getelementptr i8, ptr %packed, i64 %packed_offset",
         )
+        start = 0
+        for k, (kind, variable) in enumerate(variables):
+            function.add(f"%packed{k} = getelementptr i8, ptr %packed_item, i64 {start}")
+            outputs.append(f"ptr %packed{k}")
+            start += _BYTES[kind] * variable.size
     function.add(
-        f"%is_done = call i1 @run(ptr %parameters, {items}, ptr %y_item, ptr {packed})",
+        f"%is_done = call i1 @run(ptr %parameters, {items}, {', '.join(outputs)})",
         "br i1 %is_done, label %computed, label %refused",
     )
     function.label("computed")

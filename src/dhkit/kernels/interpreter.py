@@ -15,7 +15,7 @@ from dhkit.description import Array
 from dhkit.kernels.elementary import EXACT_RANGE, atan2
 from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER
 from dhkit.kernels.stages import Stage, Stages
-from dhkit.symbolic import Graph
+from dhkit.symbolic import Graph, Loop
 
 if TYPE_CHECKING:
     import casadi
@@ -82,6 +82,35 @@ class Interpreter:
         for k, array in enumerate(outputs):
             buffer.set_res(k, array.data)
         return Stage(parameters, inputs, outputs, run, kept=(buffer, zero))
+
+
+class LoopInterpreter:
+    """A loop as a function of batches: the steps of all items together, until the last one is done."""
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop = loop
+        self._start = Interpreter(loop.start, [FLOAT, FLOAT])
+        self._step = Interpreter(loop.step, [FLOAT, FLOAT])
+        self._finish = Interpreter(loop.finish, [FLOAT] * len(loop.outputs))
+
+    def __call__(
+        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
+    ) -> None:
+        """Fill ``outputs``; all are arrays (N, size), as for :class:`dhkit.kernels.Kernel`."""
+        count = len(inputs[0])
+        state, fixed = (np.empty((count, output.size)) for output in self._loop.start.outputs)
+        self._start(parameters, inputs, [state, fixed])
+        active = np.arange(count)
+        for _ in range(self._loop.most):
+            after = np.empty((len(active), state.shape[1]))
+            goes_on = np.empty((len(active), 1))
+            of_active = [np.ascontiguousarray(x[active]) for x in (*inputs, fixed, state)]
+            self._step(parameters, of_active, [after, goes_on])
+            state[active] = after
+            active = active[goes_on[:, 0] == 1.0]
+            if not len(active):
+                break
+        self._finish(parameters, [*inputs, fixed, state], outputs)
 
 
 def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:

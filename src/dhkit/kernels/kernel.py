@@ -17,10 +17,10 @@ from dhkit.description import Array
 from dhkit.display import repr_line
 from dhkit.errors import DhkitError
 from dhkit.kernels.threads import all_in_threads
-from dhkit.symbolic import Graph
+from dhkit.symbolic import Graph, Loop
 
 if TYPE_CHECKING:
-    from dhkit.kernels.interpreter import Interpreter
+    from dhkit.kernels.interpreter import Interpreter, LoopInterpreter
     from dhkit.kernels.machine_code import CompiledCall, CompiledFunction
 
 log = logging.getLogger(__name__)
@@ -32,6 +32,8 @@ SMALL_BATCH = 64
 COMPILE_AFTER = 65_536
 """A kernel is compiled when larger batches have asked for this number of items: interpreting them takes about as long
 as compiling (30 to 250 ms)."""
+_STEPS_OF_A_LOOP = 128
+"""Number of items of a straight-line program that an item of a loop counts as."""
 MIN_ITEMS_PER_THREAD = 4_096
 """Smallest number of items for a thread; for fewer, the transfer takes longer than it saves."""
 _MAX_KERNELS = 2_048
@@ -71,15 +73,21 @@ class Kernel:
     """
 
     def __init__(
-        self, name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str]
+        self,
+        name: str,
+        pattern: str,
+        derive: Callable[[], Graph | Loop],
+        types: Sequence[str],
+        is_loop: bool = False,
     ) -> None:
         self.name = name
         self._pattern = pattern
         self._derive = derive
         self.types = tuple(types)
-        self._graph: Graph | None = None
-        self._interpreter: Interpreter | None = None
+        self._graph: Graph | Loop | None = None
+        self._interpreter: Interpreter | LoopInterpreter | None = None
         self._function: CompiledFunction | None = None
+        self._is_loop = is_loop
         self._call: CompiledCall | None = None
         self._looked_up = False
         """Whether the cache was searched for machine code."""
@@ -172,7 +180,7 @@ class Kernel:
         if self._function is not None or self._failed:
             return self._function
         if mode == "on" or (count >= SMALL_BATCH and not _uncounted.depth):
-            self._items += count
+            self._items += count * (_STEPS_OF_A_LOOP if self._is_loop else 1)
             if mode == "on" or self._items >= COMPILE_AFTER:
                 self.compile()
             elif not self._looked_up:
@@ -199,27 +207,40 @@ class Kernel:
         log.info("compiling %s", self.name)
         try:
             from dhkit.kernels import machine_code, store
-            from dhkit.kernels.llvm_source import llvm_source
 
-            code = machine_code.compile_module(llvm_source(program, self.types))
+            source = self._source(program)
+            code = machine_code.compile_module(source)
             self._function = machine_code.CompiledFunction(code)
         except _MACHINE_CODE_ERRORS as error:
             self._give_up(error)
             return
         store.write(self.name, store.digest(self.name, self._pattern), code)
 
+    def _source(self, program: Graph | Loop) -> str:
+        """Return the text of the kernel that is compiled."""
+        if isinstance(program, Loop):
+            from dhkit.kernels.scalar_source import loop_source
+
+            return loop_source(program, self.types)
+        from dhkit.kernels.llvm_source import llvm_source
+
+        return llvm_source(program, self.types)
+
     def _give_up(self, error: Exception) -> None:
         """Interpret from now on, so that a processor unknown to LLVM stops no computation."""
         self._failed = True
         log.warning("%s is interpreted: it cannot be compiled here (%s)", self.name, error)
 
-    def _interpreted(self) -> Interpreter:
+    def _interpreted(self) -> Interpreter | LoopInterpreter:
         program = self.program()
         with _deriving:
             if self._interpreter is None:
-                from dhkit.kernels.interpreter import Interpreter
+                from dhkit.kernels.interpreter import Interpreter, LoopInterpreter
 
-                self._interpreter = Interpreter(program, self.types)
+                if isinstance(program, Loop):
+                    self._interpreter = LoopInterpreter(program)
+                else:
+                    self._interpreter = Interpreter(program, self.types)
             return self._interpreter
 
     @property
@@ -227,7 +248,7 @@ class Kernel:
         """Whether kernels are compiled: see :func:`kernel_mode`."""
         return kernel_mode()
 
-    def program(self) -> Graph:
+    def program(self) -> Graph | Loop:
         """Return the program, derived at the first call."""
         with _deriving:
             if self._graph is None:
@@ -287,7 +308,11 @@ def uncounted() -> Iterator[None]:
 
 
 def kernel(
-    name: str, pattern: str, derive: Callable[[], Graph], types: Sequence[str] = ("float64",)
+    name: str,
+    pattern: str,
+    derive: Callable[[], Graph | Loop],
+    types: Sequence[str] = ("float64",),
+    is_loop: bool = False,
 ) -> Kernel:
     """Return the kernel of a program, the same one each time.
 
@@ -298,7 +323,9 @@ def kernel(
     derive
         Returns the program; its first input holds the parameters, which all items share.
     types
-        Type of each output: float64, or uint8 for whole numbers from 0 to 255.
+        Type of each output: float64, or uint8 for whole numbers from 0 to 255, which a loop does not have.
+    is_loop
+        Whether the program is a loop, so that an item takes many steps.
 
     Returns
     -------
@@ -308,7 +335,9 @@ def kernel(
     found = _kernels.get((name, pattern))
     if found is None:
         with _deriving:
-            found = _kernels.setdefault((name, pattern), Kernel(name, pattern, derive, types))
+            found = _kernels.setdefault(
+                (name, pattern), Kernel(name, pattern, derive, types, is_loop)
+            )
             while len(_kernels) > _MAX_KERNELS:
                 del _kernels[next(iter(_kernels))]
     return found

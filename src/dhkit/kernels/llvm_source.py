@@ -33,7 +33,7 @@ FLOAT = "float64"
 """Type of an output's entries, by NumPy's name."""
 SMALL_INTEGER = "uint8"
 """Type of the entries of an output of flags, by NumPy's name."""
-_STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
+STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
 """LLVM's names of these types."""
 
 _Value: TypeAlias = Vector | Mask
@@ -156,7 +156,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     ]
     for k, name in enumerate(outputs):
         before = f"write{k - 1}_end" if k else "compute"
-        kind = _STORED[types[k]]
+        kind = STORED[types[k]]
         lines += _copied(
             f"write{k}", before, name, layout.outputs[k], layout.block, kind, reading=False
         )
@@ -208,17 +208,24 @@ def result_values(
         The entries of each output; of float outputs they are NaN where an entry of an input after the parameters is
         not finite.
     """
-    values = _node_values(graph, body, inputs)
+    outputs = plain_results(graph, body, inputs)
     missing: Vector | None = None  # 0, or NaN where an input is not finite
     for x in chain.from_iterable(inputs[1:]):
         missing = x - x if missing is None else missing + (x - x)
-    outputs = []
-    for kind, places in zip(types, graph.results, strict=True):
-        entries = [_number(values[place]) for place in places]
-        if kind == FLOAT and missing is not None:
-            entries = [entry + missing for entry in entries]
-        outputs.append(entries)
-    return outputs
+    if missing is None:
+        return outputs
+    return [
+        [entry + missing for entry in entries] if kind == FLOAT else entries
+        for kind, entries in zip(types, outputs, strict=True)
+    ]
+
+
+def plain_results(
+    graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]
+) -> list[list[Vector]]:
+    """Write a program's operations into ``body``, as :func:`result_values`, without its rule for NaN."""
+    values = _node_values(graph, body, inputs)
+    return [[_number(values[place]) for place in places] for places in graph.results]
 
 
 def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[_Value]:

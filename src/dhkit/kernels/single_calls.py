@@ -34,7 +34,7 @@ from dhkit.kernels.call_source import (
     state_shapes,
 )
 from dhkit.kernels.kernel import Kernel, compiling
-from dhkit.symbolic import Graph
+from dhkit.symbolic import Graph, Loop
 
 if TYPE_CHECKING:
     from dhkit.kernels.machine_code import CompiledCall
@@ -192,14 +192,14 @@ def _are_near(found: Sequence[NDArray[Any]], expected: Sequence[NDArray[Any]]) -
     return True
 
 
-def unpacked(packed: bytes, graph: Graph, types: Sequence[str]) -> list[NDArray[Any]]:
+def unpacked(packed: bytes, program: Graph | Loop, types: Sequence[str]) -> list[NDArray[Any]]:
     """Return the outputs of a program after the first one from what a function packed.
 
     Parameters
     ----------
     packed
         The second part of a function's result.
-    graph, types
+    program, types
         The program, and the types of its outputs.
 
     Returns
@@ -209,7 +209,7 @@ def unpacked(packed: bytes, graph: Graph, types: Sequence[str]) -> list[NDArray[
     """
     outputs: list[NDArray[Any]] = []
     start = 0
-    for output, kind in zip(graph.outputs[1:], types[1:], strict=True):
+    for output, kind in zip(program.outputs[1:], types[1:], strict=True):
         entries = np.frombuffer(packed, kind, output.size, start)
         outputs.append(entries.copy())
         start += entries.nbytes

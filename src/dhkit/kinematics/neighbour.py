@@ -36,7 +36,7 @@ from dhkit.kinematics.candidates import (
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.newton import Newton
-from dhkit.kinematics.numeric import descend, refined, solve_numerically
+from dhkit.kinematics.numeric import refined, solve_numerically
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 from dhkit.kinematics.solver import Solver, free_angles, solve_in_closed_form, solver_for
 
@@ -183,7 +183,7 @@ def _followed(description: Description, starts: Array, goals: Array) -> Array:
         T[:, :3, 3] += s * displacement
         T[:, :3, :3] = Rotation.from_rotvec(s * phi).as_matrix() @ T[:, :3, :3]
         with np.errstate(all="ignore"):
-            q, _ = descend(newton, T.reshape(-1, 16), q, _PATH_ERROR)
+            q, _ = newton.descend(T.reshape(-1, 16), q, _PATH_ERROR)
     return _refined(description, q, goals)
 
 

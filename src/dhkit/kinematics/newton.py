@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
-from dhkit.symbolic import Graph
+from dhkit.symbolic import Graph, Loop, table_pattern
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,11 @@ class Newton:
     def units(self) -> Array:
         """Unit of each joint's steps, shape (n,): 1 rad, or the reach in m."""
         return np.where(self.description.numbers.prismatic, self.length, 1.0)
+
+    @property
+    def parameters(self) -> Array:
+        """Length, units, endless joints and limits, as the programs take them, shape (1 + 4 n,)."""
+        return np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
 
     @property
     def endless(self) -> NDArray[np.bool_]:
@@ -107,14 +113,39 @@ class Newton:
         """
         n = self.description.n
         J = jacobian(self.description, q).reshape(-1, 6 * n)
-        parameters = np.concatenate(
-            [[self.length], self.units, self.endless, self.lower, self.upper]
-        )
-
         new = np.empty_like(q)
         run = step_kernel(n, self.size)
-        run(parameters, [q, error, J, damping[:, None]], [new])
+        run(self.parameters, [q, error, J, damping[:, None]], [new])
         return new
+
+    def descend(self, goals: Array, starts: Array, tolerance: float) -> tuple[Array, Array]:
+        """Search until all poses are reached or all searches are stalled.
+
+        Parameters
+        ----------
+        goals
+            Poses, shape (N, 16), row by row; rotations orthonormal to 2e-6.
+        starts
+            Shape (N, n), inside the limits.
+        tolerance
+            Largest error, see :func:`closes`.
+
+        Returns
+        -------
+        tuple[Array, Array]
+            Joint values (N, n), and the errors there, as of :meth:`error`.
+        """
+        q = np.empty_like(starts)
+        error = np.empty((len(starts), self.size))
+        run, parameters = descent_kernel(self.description, self.size)
+        tolerances = np.full((len(starts), 1), tolerance)
+        posed = np.empty((len(starts), 1))
+        run(
+            np.concatenate([parameters, self.parameters]),
+            [goals, starts, tolerances],
+            [q, error, posed],
+        )
+        return q, error
 
 
 def error_kernel(size: int) -> Kernel:
@@ -137,3 +168,26 @@ def step_kernel(n: int, size: int) -> Kernel:
         return step_program(n, size)
 
     return kernel("newton_step", f"{n} {size}", derived)
+
+
+@lru_cache(maxsize=512)
+def descent_kernel(description: Description, size: int) -> tuple[Kernel, Array]:
+    """Return the kernel of :meth:`Newton.descend`, and the first of its parameters: those of the arm's table."""
+
+    def derived() -> Loop:
+        from dhkit.kinematics.descent_program import descent_program
+
+        return descent_program(description, size)
+
+    pattern, parameters = table_pattern(description)
+    run = kernel("descent", f"{size} {pattern}", derived, ("float64",) * 3, is_loop=True)
+    return run, parameters
+
+
+def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
+    squares = error**2
+    position = squares[..., :3].sum(axis=-1)
+    rotation = squares[..., 3:].sum(axis=-1)
+    within: NDArray[np.bool_] = np.maximum(position, rotation) <= tolerance**2
+    return within

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import casadi as ca
@@ -28,21 +29,22 @@ def error_program(size: int) -> Graph:
     T = ca.SX.sym("T", 4, 4)
     goal = ca.SX.sym("goal", 4, 4)
 
-    displacement = (goal[:3, 3] - T[:3, 3]) / length
-    phi = _rotation_vector(goal[:3, :3] @ T[:3, :3].T)
-    error = ca.vertcat(displacement, phi)[:size]
+    error = pose_error(T, goal, length)[:size]
     return Graph.of("pose_error", {"length": length, "T": T, "goal": goal}, {"error": error})
 
 
+def pose_error(T: _SX, goal: _SX, length: _SX) -> _SX:
+    """Return the error of :func:`error_program`, 6 x 1."""
+    displacement = (goal[:3, 3] - T[:3, 3]) / length
+    phi = _rotation_vector(goal[:3, :3] @ T[:3, :3].T)
+    return ca.vertcat(displacement, phi)
+
+
 def step_program(n: int, size: int) -> Graph:
-    """Return the program of :meth:`dhkit.kinematics.newton.Newton.step` for n joints.
+    """Return the program of :meth:`dhkit.kinematics.newton.Newton.step` for n joints; see :func:`levenberg_step`.
 
-    Levenberg's step (Levenberg 1944) for the scaled Jacobian A, the scaled step dx and the damping lambda:
-
-        (A^T A + lambda 1) dx = A^T error,    or, the same,    dx = A^T (A A^T + lambda 1)^-1 error,
-
-    of which the smaller system is solved. A joint at a limit that the error pushes outward stays (Bertsekas 1982,
-    Projected Newton methods for optimization problems with simple constraints); the others end at theirs.
+    A joint at a limit that the error pushes outward stays (Bertsekas 1982, Projected Newton methods for optimization
+    problems with simple constraints); the others end at theirs.
     """
     length = ca.SX.sym("length")
     q = ca.SX.sym("q", n)
@@ -60,25 +62,43 @@ def step_program(n: int, size: int) -> Graph:
     # A^T error is the steepest descent of |error|^2 / 2. A joint that stays gets a column of zeros: dx_i = 0.
     descent = A.T @ error
     endless = turns != 0
-    stays = [_stays(q[i], descent[i], lower[i], upper[i], endless[i]) for i in range(n)]
-    A = A @ ca.diag(ca.vertcat(*(ca.if_else(stuck, 0.0, 1.0) for stuck in stays)))
-
-    if n < size:
-        dx = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
-    else:
-        dx = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
-
-    # The whole step is shortened, which keeps its direction, until no joint moves by more than _MAX_STEP.
-    share = ca.fmin(1.0, _MAX_STEP / (ca.norm_inf(dx) + _TINY))
-    new = q + dx * units * share
-    ends = [_moved_inside(new[i], lower[i], upper[i], endless[i]) for i in range(n)]
+    stuck = [stays(q[i], descent[i], lower[i], upper[i], endless[i]) for i in range(n)]
+    new = q + units * levenberg_step(A, error, damping, stuck)
+    ends = [moved_inside(new[i], lower[i], upper[i], endless[i]) for i in range(n)]
 
     parameters = ca.vertcat(length, units, turns, lower, upper)
     inputs = {"parameters": parameters, "q": q, "error": error, "J": J, "damping": damping}
     return Graph.of("newton_step", inputs, {"q": ca.vertcat(*ends)})
 
 
-def _stays(q: _SX, descent: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
+def levenberg_step(A: _SX, error: _SX, damping: _SX, stuck: Sequence[_SX]) -> _SX:
+    """Return Levenberg's step dx without units, n x 1 (Levenberg 1944).
+
+    For the Jacobian A without units and the damping lambda,
+
+        (A^T A + lambda 1) dx = A^T error,    or, the same,    dx = A^T (A A^T + lambda 1)^-1 error,
+
+    of which the smaller system is solved.
+
+    Parameters
+    ----------
+    A, error, damping
+        size x n, size x 1, and a number.
+    stuck
+        Whether each joint stays where it is: it gets a column of zeros, so that dx_i = 0.
+    """
+    size, n = A.shape
+    A = A @ ca.diag(ca.vertcat(*(ca.if_else(stays_there, 0.0, 1.0) for stays_there in stuck)))
+    if n < size:
+        dx = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
+    else:
+        dx = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
+
+    # The whole step is shortened, which keeps its direction, until no joint moves by more than _MAX_STEP.
+    return dx * ca.fmin(1.0, _MAX_STEP / (ca.norm_inf(dx) + _TINY))
+
+
+def stays(q: _SX, descent: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     """Return whether a joint is at a limit and descent pushes it outward; an endless joint never stays."""
     outward = ca.logic_or(
         ca.logic_and(q >= upper, descent > 0), ca.logic_and(q <= lower, descent < 0)
@@ -86,7 +106,7 @@ def _stays(q: _SX, descent: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     return ca.logic_and(outward, ca.logic_not(endless))
 
 
-def _moved_inside(x: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
+def moved_inside(x: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     """Return a joint position inside its limits, by a whole turn back where the range allows one."""
     x = ca.if_else(ca.logic_and(x > upper, endless), x - math.tau, x)
     x = ca.if_else(ca.logic_and(x < lower, endless), x + math.tau, x)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.kernels import SMALL_BATCH, check_whole, in_threads, pose_rows, uncounted
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrap_angles
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.forward import forward_kinematics
-from dhkit.kinematics.newton import Newton
+from dhkit.kinematics.newton import Newton, closes
 from dhkit.kinematics.solutions import IKSolutions
 
 Progress: TypeAlias = Callable[[int, int], None]
@@ -27,22 +28,6 @@ _MIN_POSES_PER_THREAD = 64
 """Smallest number of poses that a thread gets at a time: fewer take less time than handing them over."""
 _MIN_CANDIDATES = 512
 """Smallest number of random joint positions from which starts are chosen."""
-_ALWAYS_STEP = 1e-2
-"""Squared error, (rad, share of the reach)^2, below which every step is taken, because along a curved valley the error
-of Newton's method grows before it falls."""
-_STALL_RATIO = 0.7
-"""A search is stalled, and given up, when its squared error has not fallen below this ratio times its value
-_STALL_STEPS steps earlier."""
-_STALL_STEPS = 10
-"""Number of steps in which the squared error of a search must fall below _STALL_RATIO times its value."""
-_MIN_DAMPING = 1e-4
-"""Smallest ratio of the damping to the squared error."""
-_DAMPING_DECREASE = 0.25
-"""Factor of the damping after a step that reduces the error."""
-_DAMPING_INCREASE = 4.0
-"""Factor of the damping after a step that is rejected because it increases the error."""
-_BASE_DAMPING = 1e-13
-"""Damping that is always added, for Jacobians without full rank."""
 _REFINED = 1e-13
 """Error at which Newton's method stops refining a solution of another solver: share of the reach, and rad."""
 _REFINED_CLOSES = 1e-10
@@ -184,11 +169,11 @@ class NumericSearch:
         first
             First start of each pose, shape (N, n), rad and m.
         """
-        q, error = descend(self.newton, goals, first, self.tolerance)
+        q, error = self.newton.descend(goals, first, self.tolerance)
         open_rows = np.flatnonzero(~closes(error, self.tolerance))
         if len(open_rows) and self.restarts:
-            more = self._starts(goals[open_rows])
-            for begin, end in _doubling(self.restarts):
+            more = self.starts(goals[open_rows])
+            for begin, end in doubling(self.restarts):
                 poses_at_once = max(1, CHUNK // (end - begin))
                 for some in _chunks(len(open_rows), poses_at_once):
                     rows = open_rows[some]
@@ -197,37 +182,34 @@ class NumericSearch:
                 left = ~closes(error[open_rows], self.tolerance)
                 open_rows = open_rows[left]
                 more = more[left]
-        self._polish(q, error, goals)
         q[~closes(error, self.tolerance)] = np.nan
         return q, self.newton.length * np.linalg.norm(error[:, :3], axis=1)
 
-    def _polish(self, q: Array, error: Array, goals: Array) -> None:
-        """Take one more step where that helps: it squares the error, down to rounding."""
-        last = self.newton.step(q, error, np.full(len(q), _BASE_DAMPING))
-        last_error = self.newton.error(last, goals)
-        helps = np.sum(last_error**2, axis=1) < np.sum(error**2, axis=1)
-        q[helps] = last[helps]
-        error[helps] = last_error[helps]
-
-    def _starts(self, goals: Array) -> Array:
+    def starts(self, goals: Array) -> Array:
         """Return random joint positions whose poses are near the goals, nearest first, shape (N, restarts, n)."""
-        newton = self.newton
-        description = newton.description
-
-        # Candidates are the same for all poses, so that the result for a pose does not depend on the others.
-        lower, upper = newton.ranges(np.where(description.numbers.prismatic, newton.length, np.pi))
-        count = max(_MIN_CANDIDATES, self.restarts)
-        draws = np.random.default_rng(self.seed).random((count, description.n))
-        q = lower + (upper - lower) * draws
-
         # Goal a and candidate b: |a - b|^2 = a.a - 2 a.b + b.b; a.a is the same for all candidates, and left out.
+        q, b, squares = self._candidates
         a = self._coordinates(goals)
-        b = self._coordinates(forward_kinematics(description, q).reshape(-1, 16))
-        gaps = np.sum(b**2, axis=1) - 2 * a @ b.T
+        gaps = squares - 2 * a @ b.T
 
         nearest = np.argpartition(gaps, self.restarts - 1, axis=1)[:, : self.restarts]
         order = np.argsort(np.take_along_axis(gaps, nearest, axis=1), axis=1, kind="stable")
         return q[np.take_along_axis(nearest, order, axis=1)]
+
+    @cached_property
+    def _candidates(self) -> tuple[Array, Array, Array]:
+        """Random joint positions (K, n), the coordinates b (K, 12 or 3) of their poses, and b.b, shape (K,).
+
+        They are the same for all poses, so that the result for a pose does not depend on the others.
+        """
+        newton = self.newton
+        description = newton.description
+        lower, upper = newton.ranges(np.where(description.numbers.prismatic, newton.length, np.pi))
+        count = max(_MIN_CANDIDATES, self.restarts)
+        draws = np.random.default_rng(self.seed).random((count, description.n))
+        q = lower + (upper - lower) * draws
+        b = self._coordinates(forward_kinematics(description, q).reshape(-1, 16))
+        return q, b, np.sum(b**2, axis=1)
 
     def _coordinates(self, poses: Array) -> Array:
         """Return points whose distances are about those of poses (N, 16): lengths over the reach, angles in rad.
@@ -253,7 +235,7 @@ class NumericSearch:
         """Search from starts (M, k, n) and store better results in rows of ``q`` and ``error``."""
         count, k, n = starts.shape
         many = np.ascontiguousarray(starts.reshape(-1, n))
-        found, misses = descend(self.newton, np.repeat(goals, k, axis=0), many, self.tolerance)
+        found, misses = self.newton.descend(np.repeat(goals, k, axis=0), many, self.tolerance)
         found = found.reshape(count, k, n)
         misses = misses.reshape(count, k, -1)
         closed = closes(misses, self.tolerance)
@@ -269,87 +251,6 @@ class NumericSearch:
         chosen = (np.flatnonzero(better), best[better])
         q[rows[better]] = found[chosen]
         error[rows[better]] = misses[chosen]
-
-
-@dataclass(frozen=True, eq=False)
-class _Descent:
-    """Running searches, N rows."""
-
-    row: NDArray[np.intp]
-    """Index of the pose of each search."""
-    goals: Array
-    q: Array
-    error: Array
-    cost: Array
-    """The squared error."""
-    damping: Array
-    """Damping over the squared error."""
-    reference_cost: Array
-    """Squared error at the last progress by _STALL_RATIO."""
-    steps_since: NDArray[np.intp]
-    """Number of steps since that progress."""
-
-    @classmethod
-    def start(cls, newton: Newton, goals: Array, q: Array) -> _Descent:
-        """Begin at q, shape (N, n)."""
-        error = newton.error(q, goals)
-        N = len(q)
-        cost = np.sum(error**2, axis=1)
-        return cls(
-            np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp)
-        )
-
-    def selected(self, keep: NDArray[np.bool_]) -> _Descent:
-        """Return the searches marked in ``keep``, shape (N,)."""
-        if keep.all():
-            return self
-        return _Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
-
-    def step(self, newton: Newton) -> _Descent:
-        """Return the searches after a step; where it does not help, the damping is raised instead.
-
-        The damping of Newton's step is lambda = mu |e|^2 + lambda_0, with the error e and the ratio mu of ``damping``:
-        it vanishes with the error, so that the last steps are Newton's (Yamashita and Fukushima 2001; Sugihara 2011).
-        """
-        q = newton.step(self.q, self.error, self.damping * self.cost + _BASE_DAMPING)
-        error = newton.error(q, self.goals)
-        cost = np.sum(error**2, axis=1)
-
-        helps = cost < self.cost
-        taken = helps | (np.maximum(cost, self.cost) < _ALWAYS_STEP)
-        cost = np.where(taken, cost, self.cost)
-
-        # mu is decreased after a step that helps, kept after one that is taken all the same, else increased.
-        decreased = np.maximum(self.damping * _DAMPING_DECREASE, _MIN_DAMPING)
-        increased = self.damping * _DAMPING_INCREASE
-        damping = np.select([helps, taken], [decreased, self.damping], increased)
-
-        progresses = cost < _STALL_RATIO * self.reference_cost
-        return _Descent(
-            self.row,
-            self.goals,
-            np.where(taken[:, None], q, self.q),
-            np.where(taken[:, None], error, self.error),
-            cost,
-            damping,
-            np.where(progresses, cost, self.reference_cost),
-            np.where(progresses, 0, self.steps_since + 1),
-        )
-
-
-def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
-    """Search for poses (N, 16) from q (N, n) until all are reached or stalled; return joint positions and errors."""
-    last_q = np.empty_like(q)
-    last_error = np.empty((len(q), newton.size))
-    searches = _Descent.start(newton, goals, q)
-    while len(searches.row):
-        over = closes(searches.error, tolerance) | (searches.steps_since >= _STALL_STEPS)
-        last_q[searches.row[over]] = searches.q[over]
-        last_error[searches.row[over]] = searches.error[over]
-        searches = searches.selected(~over)
-        if len(searches.row):
-            searches = searches.step(newton)
-    return last_q, last_error
 
 
 def refined(description: Description, q: Array, goals: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -372,17 +273,8 @@ def refined(description: Description, q: Array, goals: Array) -> tuple[Array, ND
     newton = Newton.of(description, position_only=False, limits=False)
     # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
     with np.errstate(all="ignore"), uncounted():
-        q, error = descend(newton, goals, q, _REFINED)
+        q, error = newton.descend(goals, q, _REFINED)
     return wrap_angles(q, ~description.numbers.prismatic), closes(error, _REFINED_CLOSES)
-
-
-def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
-    """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
-    squares = error**2
-    position = squares[..., :3].sum(axis=-1)
-    rotation = squares[..., 3:].sum(axis=-1)
-    within: NDArray[np.bool_] = np.maximum(position, rotation) <= tolerance**2
-    return within
 
 
 def _first_starts(newton: Newton, q0: ArrayLike | None, batch: tuple[int, ...]) -> Array:
@@ -400,7 +292,7 @@ def _first_starts(newton: Newton, q0: ArrayLike | None, batch: tuple[int, ...]) 
     return newton.inside(np.where(finite, given, newton.middle))
 
 
-def _doubling(count: int) -> Iterator[tuple[int, int]]:
+def doubling(count: int) -> Iterator[tuple[int, int]]:
     """Yield 0, 1; 1, 3; 3, 7 ... up to a count."""
     begin = 0
     while begin < count:

@@ -11,7 +11,7 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit, limit_parameters
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
-from dhkit.kinematics.newton import error_kernel, step_kernel
+from dhkit.kinematics.newton import descent_kernel, error_kernel, step_kernel
 from dhkit.kinematics.solutions import IKFlag, IKStatus
 from dhkit.kinematics.solver import solver_of
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
@@ -53,7 +53,7 @@ def kinematic_kernels(description: Description) -> list[Kernel]:
     --------
     >>> from dhkit.description import library_robot
     >>> len(kinematic_kernels(library_robot("puma560")))
-    11
+    13
     """
     with_parameters = [
         tool_kernel(description),
@@ -64,6 +64,7 @@ def kinematic_kernels(description: Description) -> list[Kernel]:
     kernels = [kernel for kernel, _ in with_parameters]
     for size in (6, 3):  # Newton's method for whole poses, and for positions
         kernels += [error_kernel(size), step_kernel(description.n, size)]
+        kernels.append(descent_kernel(description, size)[0])
     solver = solver_of(description)
     return kernels if solver is None else [*kernels, solver.kernel]
 

@@ -71,6 +71,7 @@ from .programs.graph import (
     Variable as Variable,
     operation_count as operation_count,
 )
+from .programs.loop import Loop as Loop
 from .programs.printers import c_source as c_source, export_c as export_c
 from .ring.elements import Element as Element, Elements as Elements, RingError as RingError
 from .textbook import TextbookDerivation as TextbookDerivation, derive as derive

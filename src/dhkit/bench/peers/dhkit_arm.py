@@ -12,6 +12,7 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.bench.agreement import stacked
 from dhkit.bench.contenders import (
+    INVERSE_KINEMATICS,
     QUANTITIES,
     Call,
     Contender,
@@ -28,6 +29,9 @@ BATCH = "dhkit, out="
 _NEW_ARRAYS = "dhkit"
 SINGLE = "dhkit, one call"
 SINGLE_INTO_OUT = "dhkit, one call, out="
+NEAR = "dhkit, one call, from 0.05 rad"
+NEAR_BY = 0.05
+"""How far a start of numeric inverse kinematics is from a solution, each joint, rad and m."""
 FEW = (2, 8, 64)
 """Sizes of small batches."""
 
@@ -45,6 +49,7 @@ def contenders() -> tuple[Contender, ...]:
     for quantity in QUANTITIES:
         for name, mode, setup in setups:
             found.append(Contender(name, quantity, mode, setup(quantity), own=True))
+    found.append(Contender(NEAR, "ik_numeric", Mode.SINGLE, _from_near, own=True))
     return tuple(found)
 
 
@@ -169,7 +174,19 @@ def _few(size: int, quantity: str) -> Callable[[Workload], Task]:
     return setup
 
 
+def _from_near(workload: Workload) -> Task:
+    """Return the task of numeric inverse kinematics from joint values that are 0.05 rad or m off each."""
+    function = method(workload.arm, "ik_numeric")
+    items = list(zip(workload.T_inside, workload.q_inside + NEAR_BY, strict=True))
+    return Task(
+        one_by_one(function, items),
+        lambda count: [_answer("ik_numeric", function(*item)) for item in items[:count]],
+    )
+
+
 def _refuse_open_form(workload: Workload, quantity: str) -> None:
+    if quantity == "ik_numeric":
+        raise UnavailableError("arm.ik_numeric has no out=")
     if quantity == "ik" and workload.arm.family.fit is None:
         raise UnavailableError(
             "arm.ik takes out= only where a closed form decides how many branches there are"
@@ -177,14 +194,14 @@ def _refuse_open_form(workload: Workload, quantity: str) -> None:
 
 
 def _answers(quantity: str, result: Any) -> Sequence[Array]:
-    if quantity != "ik":
+    if quantity not in INVERSE_KINEMATICS:
         return list(stacked(result))
     return [q[valid] for q, valid in zip(result.q, result.valid, strict=True)]
 
 
 def _answer(quantity: str, result: Any) -> Array:
     """Return the answer of a call for one state."""
-    if quantity != "ik":
+    if quantity not in INVERSE_KINEMATICS:
         return stacked(result)
     reached: Array = result.q[result.valid]
     return reached

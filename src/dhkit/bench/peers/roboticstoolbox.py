@@ -19,10 +19,12 @@ from dhkit.bench.contenders import (
     single_task,
 )
 from dhkit.bench.geometry import has_spherical_wrist, joint_axes
+from dhkit.bench.peers.dhkit_arm import NEAR_BY
 from dhkit.description import Array, Convention, Description
 
 _IK_OPTIONS = {"joint_limits": False, "tol": 1e-20}
 """Half the squared error at which ik_LM stops: its default of 1e-6 leaves the tool a millimetre off."""
+_IK_INSIDE_OPTIONS = {"joint_limits": True, "tol": 1e-20}
 _SAME_ARM = 1e-12
 """Largest difference of poses, m, of the toolbox's own PUMA and ours if they are the same arm."""
 
@@ -56,6 +58,17 @@ def contenders() -> tuple[Contender, ...]:
             Mode.SINGLE,
             _single("ik", lambda robot: partial(robot.ets().ik_LM, **_IK_OPTIONS), _successful),
         ),
+        (
+            "ik_LM",
+            "ik_numeric",
+            Mode.SINGLE,
+            _single(
+                "ik_numeric",
+                lambda robot: partial(robot.ets().ik_LM, **_IK_INSIDE_OPTIONS),
+                _successful,
+            ),
+        ),
+        ("ik_LM, from 0.05 rad", "ik_numeric", Mode.SINGLE, _ik_from_near),
         (
             "rne",
             "inverse_dynamics",
@@ -93,6 +106,17 @@ def _single(
         return single_task(function, zip(*workload.inputs(quantity), strict=True), answer)
 
     return setup
+
+
+def _ik_from_near(workload: Workload) -> Task:
+    """Return the task of ik_LM from joint values that are 0.05 rad or m off each."""
+    solve = toolbox_robot(workload.arm.description).ets().ik_LM
+
+    def from_near(T: Array, q0: Array) -> Any:
+        return solve(T, q0=q0, **_IK_INSIDE_OPTIONS)
+
+    items = zip(workload.T_inside, workload.q_inside + NEAR_BY, strict=True)
+    return single_task(from_near, items, _successful)
 
 
 def _batch(

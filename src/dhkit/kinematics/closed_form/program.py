@@ -50,7 +50,7 @@ def _graph(
 ) -> Graph:
     T = ca.SX.sym("T", 4, 4)
     free = ca.SX.sym("free", 2)
-    is_pose = _is_pose(T)
+    posed = is_pose(T)
     scale = named["reach"] + ca.norm_1(T[:3, 3])
     pose = PoseSymbols(
         T=T[:3, :],
@@ -72,7 +72,7 @@ def _graph(
     singular = []
     distances = []
     for branch in branches:
-        is_valid = ca.logic_and(is_pose, ca.logic_and(branch.miss == 0, _is_finite(branch)))
+        is_valid = ca.logic_and(posed, ca.logic_and(branch.miss == 0, _is_finite(branch)))
         valid.append(is_valid)
         q.append(ca.horzcat(*(if_else(is_valid, x, np.nan) for x in branch.q)))
         flags.append(if_else(is_valid, _flags(branch, limits, prismatic), 0.0))
@@ -88,10 +88,10 @@ def _graph(
         {**parameters, "T": T, "free": free},
         {
             "q": ca.vertcat(*q),
-            "distance": if_else(is_pose, distance, np.nan),
+            "distance": if_else(posed, distance, np.nan),
             "valid": ca.vertcat(*(if_else(is_valid, 1.0, 0.0) for is_valid in valid)),
             "flags": ca.vertcat(*flags),
-            "status": if_else(is_pose, status, float(IKStatus.not_a_pose)),
+            "status": if_else(posed, status, float(IKStatus.not_a_pose)),
         },
     )
 
@@ -101,7 +101,7 @@ def _is_finite(branch: Branch) -> Any:
     return ca.fabs(sum(branch.q)) < 1e300
 
 
-def _is_pose(T: ca.SX) -> Any:
+def is_pose(T: ca.SX) -> Any:
     """Return whether T is a pose: R^T R = 1 with a positive determinant, a last row 0 0 0 1, finite coordinates."""
     R = T[:3, :3]
     entries = [*_defects(T), T[3, 0], T[3, 1], T[3, 2], T[3, 3] - 1.0]

@@ -1,0 +1,161 @@
+"""Text of LLVM's intermediate representation for one item: a straight-line program, or one that repeats a step.
+
+For single calls, where a vector would have idle lanes, and for loops, whose items end after different numbers of steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+
+from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER, STORED, plain_results, result_values
+from dhkit.kernels.vectors import EXACT, FUSING, Body, Vector
+from dhkit.symbolic import Graph, Loop
+
+
+def run_source(
+    program: Graph | Loop, types: Sequence[str], *, refuses_nan: bool = False
+) -> list[str]:
+    """Return the lines of ``i1 run(ptr parameters, ptr x0, ..., ptr y0, ...)``, which computes one item.
+
+    It reads an item's inputs before it writes its outputs, so that they may share memory. Float outputs are NaN where
+    an input is not finite.
+
+    Parameters
+    ----------
+    program
+        The program; its first input holds the parameters.
+    types
+        Types of its outputs, see :func:`dhkit.kernels.llvm_source.llvm_source`.
+    refuses_nan
+        Whether it writes nothing and returns false where an entry of the first output is not finite.
+    """
+    # As in the vector kernel: programs that decide small integers round every operation.
+    body = Body(EXACT if SMALL_INTEGER in types else FUSING, width=1)
+    inputs = [
+        _loaded(body, f"%{name}", variable.size)
+        for name, variable in zip(_input_names(program), program.inputs, strict=True)
+    ]
+    if isinstance(program, Loop):
+        outputs = _loop_values(program, body, inputs)
+    else:
+        outputs = result_values(program, body, inputs, types)
+
+    if refuses_nan:
+        # x - x is 0, and NaN where x is not finite.
+        total = outputs[0][0] - outputs[0][0]
+        for x in outputs[0][1:]:
+            total = total + (x - x)
+        body.lines.append(f"  br i1 {total.equals(0.0).name}, label %store, label %refused")
+    else:
+        body.lines.append("  br label %store")
+    pointers = [*_input_names(program), *(f"y{k}" for k in range(len(outputs)))]
+    return [
+        *body.declarations(),
+        *Body().declarations(),
+        f"define internal i1 @run({', '.join(f'ptr %{pointer}' for pointer in pointers)}) {{",
+        "begin:",
+        *body.lines,
+        "store:",
+        *chain.from_iterable(
+            _stored(f"y{k}", entries, kind)
+            for k, (entries, kind) in enumerate(zip(outputs, types, strict=True))
+        ),
+        "  ret i1 true",
+        "refused:",
+        "  ret i1 false",
+        "}",
+    ]
+
+
+def loop_source(loop: Loop, types: Sequence[str]) -> str:
+    """Return a module with the function ``kernel`` of :func:`dhkit.kernels.llvm_source.llvm_source`, item by item."""
+    sizes = [variable.size for variable in (*loop.inputs[1:], *loop.outputs)]
+    kinds = ["double"] * (len(loop.inputs) - 1) + [STORED[kind] for kind in types]
+    lines = [
+        *run_source(loop, types),
+        "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
+        "entry:",
+        "  %none = icmp sle i64 %count, 0",
+        "  br i1 %none, label %end, label %item",
+        "item:",
+        "  %k = phi i64 [0, %entry], [%next, %item]",
+    ]
+    for j, (size, kind) in enumerate(zip(sizes, kinds, strict=True)):
+        lines += [
+            f"  %array{j}_at = getelementptr ptr, ptr %arrays, i64 {j}",
+            f"  %array{j} = load ptr, ptr %array{j}_at",
+            f"  %offset{j} = mul i64 %k, {size}",
+            f"  %row{j} = getelementptr {kind}, ptr %array{j}, i64 %offset{j}",
+        ]
+    rows = ", ".join(f"ptr %row{j}" for j in range(len(sizes)))
+    return "\n".join(
+        [
+            *lines,
+            f"  %done = call i1 @run(ptr %parameters, {rows})",
+            "  %next = add i64 %k, 1",
+            "  %more = icmp slt i64 %next, %count",
+            "  br i1 %more, label %item, label %end",
+            "end:",
+            "  ret void",
+            "}",
+            "",
+        ]
+    )
+
+
+def _input_names(program: Graph | Loop) -> list[str]:
+    return ["parameters", *(f"x{k}" for k in range(len(program.inputs) - 1))]
+
+
+def _loop_values(loop: Loop, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[list[Vector]]:
+    """Write a loop into ``body`` and return the entries of its outputs."""
+    # Where an input is not finite, the start is NaN, and all that follows from it.
+    first, fixed = result_values(loop.start, body, inputs, [FLOAT, FLOAT])
+    body.lines += ["  br label %before", "before:", "  br label %step", "step:"]
+
+    # The state's values and the number of steps come from the start, and then from the step before, whose values are
+    # known only after the step is written.
+    state = [Vector(body, f"%state{k}") for k in range(len(first))]
+    place = len(body.lines)
+    body.lines.append("")
+    after, (goes_on,) = plain_results(loop.step, body, [*inputs, fixed, state])
+    origins = ["  %steps = phi i64 [0, %before], [%steps_after, %step]"]
+    for now, old, new in zip(state, first, after, strict=True):
+        origins.append(f"  {now.name} = phi double [{old.name}, %before], [{new.name}, %step]")
+    body.lines[place] = "\n".join(origins)
+
+    body.lines += [
+        "  %steps_after = add i64 %steps, 1",
+        f"  %has_steps = icmp slt i64 %steps_after, {loop.most}",
+        f"  %goes_on = and i1 {goes_on.differs(0.0).name}, %has_steps",
+        "  br i1 %goes_on, label %step, label %finish",
+        "finish:",
+    ]
+    return plain_results(loop.finish, body, [*inputs, fixed, after])
+
+
+def _loaded(body: Body, pointer: str, size: int) -> list[Vector]:
+    values = []
+    for k in range(size):
+        place = body.define(f"getelementptr double, ptr {pointer}, i64 {k}")
+        values.append(Vector(body, body.define(f"load double, ptr {place}")))
+    return values
+
+
+def _stored(pointer: str, entries: Sequence[Vector], kind: str) -> list[str]:
+    """Return the lines that write the entries of an output; its place may be unaligned."""
+    lines = []
+    for k, entry in enumerate(entries):
+        place = f"%{pointer}_{k}"
+        value = entry.name
+        lines.append(f"  {place} = getelementptr {STORED[kind]}, ptr %{pointer}, i64 {k}")
+        if kind != FLOAT:
+            # In two steps, because the processor's instruction converts to 32 bits.
+            lines += [
+                f"  {place}_wide = fptosi double {value} to i32",
+                f"  {place}_small = trunc i32 {place}_wide to {STORED[kind]}",
+            ]
+            value = f"{place}_small"
+        lines.append(f"  store {STORED[kind]} {value}, ptr {place}, align 1")
+    return lines

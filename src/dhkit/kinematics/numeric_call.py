@@ -1,0 +1,116 @@
+"""Numeric inverse kinematics of one pose by a compiled search; see :mod:`dhkit.kernels.single_calls`."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Array, Description, world_to_tool
+from dhkit.kernels import FastCall, SingleCall
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES
+from dhkit.kinematics.newton import Newton, closes, descent_kernel
+from dhkit.kinematics.numeric import NumericSearch, doubling
+from dhkit.kinematics.solutions import IKSolutions, IKStatus
+
+_DEFAULT_RESTARTS = 63
+_SIZE = 6
+"""Number of coordinates of a pose that is to be reached."""
+_PACKED = struct.Struct(f"{_SIZE + 1}d")
+"""The error, 6 numbers, and whether T is a pose, 1 or 0."""
+_FOUND = struct.pack("=d?BB", 0.0, True, 0, IKStatus.ok)
+"""Distance, valid, flags and status of a pose that is reached, as :meth:`IKSolutions.of_packed` reads them."""
+
+
+class NumericCall:
+    """One solution of one pose T (4, 4) inside the limits, or None of what it does not take and does not find.
+
+    It begins as :func:`dhkit.kinematics.solve_numerically` does, with the same starts in the same order.
+    """
+
+    def __init__(self, description: Description) -> None:
+        newton = Newton.of(description, position_only=False, limits=True)
+        kernel, table = descent_kernel(description, _SIZE)
+        self._newton = newton
+        self._middle = newton.middle
+        self._searches: dict[int, NumericSearch] = {}
+        self._shared = {
+            "branches": ("numeric",),
+            "met": ALL_COORDINATES,
+            "description": description,
+            "complete": False,
+        }
+        near = newton.middle + 0.1
+        self._call: FastCall = SingleCall(
+            kernel,
+            np.concatenate([table, newton.parameters]),
+            (1, description.n),
+            install=self._install,
+            example=[world_to_tool(description, newton.inside(near)), newton.middle, np.ones(1)],
+        )
+
+    def _install(self, call: FastCall) -> None:
+        self._call = call
+
+    def compile(self) -> None:
+        """Compile the search now."""
+        if isinstance(self._call, SingleCall):
+            self._call.compile()
+
+    def __call__(self, T: Any, q0: Any, tolerance: float, seed: int) -> IKSolutions | None:
+        """Return the solution.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in the world, shape (4, 4), m.
+        q0
+            Start, shape (n,), rad and m; None for the middle of the limits.
+        tolerance
+            Largest error: position as a share of the reach, rotation in rad.
+        seed
+            Seed of the random starts.
+        """
+        if not tolerance > 0.0 or seed < 0:
+            return None
+        first = self._middle if q0 is None else q0
+        found = self._call(T, first, np.array([tolerance]), None)
+        if found is None:
+            return None
+        q, packed = found
+        x, y, z, a, b, c, posed = _PACKED.unpack(packed)
+        if not posed:
+            return None
+        square = max(x * x + y * y + z * z, a * a + b * b + c * c)
+        # False where the start is not finite.
+        if square <= tolerance * tolerance:
+            return IKSolutions.of_packed(q, _FOUND, self._shared)
+        return self._restarted(T, first, tolerance, seed)
+
+    def _restarted(self, T: Array, first: Array, tolerance: float, seed: int) -> IKSolutions | None:
+        """Return the solution from further starts, the nearest to the first start of those found together."""
+        if not np.isfinite(first).all():
+            return None
+        newton = self._newton
+        inside = newton.inside(first)
+        starts = self._search(seed).starts(T.reshape(1, 16))[0]
+        for begin, end in doubling(_DEFAULT_RESTARTS):
+            count = end - begin
+            goals = np.broadcast_to(T, (count, 4, 4)).copy()
+            tolerances = np.full((count, 1), tolerance)
+            q, packed = self._call(goals, starts[begin:end].copy(), tolerances, None)
+            error = np.frombuffer(packed).reshape(count, _SIZE + 1)[:, :_SIZE]
+            closed = np.flatnonzero(closes(error, tolerance))
+            if len(closed):
+                moved = (q[closed, 0] - inside) / newton.units
+                nearest = closed[np.argmin((moved**2).sum(axis=1))]
+                return IKSolutions.of_packed(q[nearest].copy(), _FOUND, self._shared)
+        return None
+
+    def _search(self, seed: int) -> NumericSearch:
+        """Return the search whose starts are used, kept for its random joint positions."""
+        if seed not in self._searches:
+            self._searches.clear()
+            self._searches[seed] = NumericSearch(self._newton, 1.0, _DEFAULT_RESTARTS, seed)
+        return self._searches[seed]
