@@ -260,7 +260,7 @@ def test_an_interrupted_run_reports_what_it_measured():
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        ({"quantities": ["fkk"]}, "no quantity 'fkk'; expected fk, ik, jacobian"),
+        ({"quantities": ["fkk"]}, "no quantity 'fkk'; expected fk, ik, ik_numeric"),
         ({"batch": 0}, "batch is 0"),
         ({"threads": 0}, "threads is 0"),
         ({"repeats": 0}, "repeats is 0"),

@@ -91,7 +91,7 @@ def test_the_workspace_is_drawn_and_the_distance_is_live(kept_page):
     page.choose(labelled("Workspace"), "points")
     page.until("dhkit.stage.overlays.layers.points.group.children.length === 1")
     page.until(
-        "document.querySelector('#panel-workspace .note').textContent.startsWith('10000 points')"
+        "document.querySelector('#panel-workspace .note').textContent.startsWith('10,000 points')"
     )
     l1, l2 = lab.desk.arm.description.numbers.a
     for q in ([0.3, 0.4], [1.0, 2.0]):

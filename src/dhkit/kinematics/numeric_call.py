@@ -24,7 +24,7 @@ _FOUND = struct.pack("=d?BB", 0.0, True, 0, IKStatus.ok)
 
 
 class NumericCall:
-    """One solution of one pose T (4, 4) inside the limits, or None of what it does not take and does not find.
+    """One solution of one pose or of a few inside the limits, or None of what it does not take and does not find.
 
     It begins as :func:`dhkit.kinematics.solve_numerically` does, with the same starts in the same order.
     """
@@ -33,6 +33,7 @@ class NumericCall:
         newton = Newton.of(description, position_only=False, limits=True)
         kernel, table = descent_kernel(description, _SIZE)
         self._newton = newton
+        self._n = description.n
         self._middle = newton.middle
         self._searches: dict[int, NumericSearch] = {}
         self._shared = {
@@ -64,9 +65,9 @@ class NumericCall:
         Parameters
         ----------
         T
-            Pose of the tool in the world, shape (4, 4), m.
+            Poses of the tool in the world, shape (4, 4), or (N, 4, 4) with few of them, m.
         q0
-            Start, shape (n,), rad and m; None for the middle of the limits.
+            Start, shape (n,) or (N, n), rad and m; None for the middle of the limits.
         tolerance
             Largest error: position as a share of the reach, rotation in rad.
         seed
@@ -75,6 +76,8 @@ class NumericCall:
         if not tolerance > 0.0 or seed < 0:
             return None
         first = self._middle if q0 is None else q0
+        if type(T) is np.ndarray and T.ndim == 3:
+            return self._few(T, first, tolerance, seed)
         found = self._call(T, first, np.array([tolerance]), None)
         if found is None:
             return None
@@ -86,10 +89,33 @@ class NumericCall:
         # False where the start is not finite.
         if square <= tolerance * tolerance:
             return IKSolutions.of_packed(q, _FOUND, self._shared)
-        return self._restarted(T, first, tolerance, seed)
+        restarted = self._restarted(T, first, tolerance, seed)
+        if restarted is None:
+            return None
+        return IKSolutions.of_packed(restarted[None], _FOUND, self._shared)
 
-    def _restarted(self, T: Array, first: Array, tolerance: float, seed: int) -> IKSolutions | None:
-        """Return the solution from further starts, the nearest to the first start of those found together."""
+    def _few(self, T: Array, first: Any, tolerance: float, seed: int) -> IKSolutions | None:
+        """Return the solutions of poses (N, 4, 4): searched for together, and restarted one by one."""
+        count = len(T)
+        if type(first) is not np.ndarray or first.shape not in ((self._n,), (count, self._n)):
+            return None
+        starts = np.array(np.broadcast_to(first, (count, self._n)), dtype=float, order="C")
+        found = self._call(T, starts, np.full((count, 1), tolerance), None)
+        if found is None:
+            return None
+        q, packed = found
+        results = np.frombuffer(packed).reshape(count, _SIZE + 1)
+        if not results[:, _SIZE].all():
+            return None
+        for k in np.flatnonzero(~closes(results[:, :_SIZE], tolerance)):
+            restarted = self._restarted(T[k], starts[k], tolerance, seed)
+            if restarted is None:
+                return None
+            q[k, 0] = restarted
+        return IKSolutions.of_packed(q, _FOUND * count, self._shared)
+
+    def _restarted(self, T: Array, first: Array, tolerance: float, seed: int) -> Array | None:
+        """Return the solution (n,) from further starts, the nearest to the first start of those found together."""
         if not np.isfinite(first).all():
             return None
         newton = self._newton
@@ -105,7 +131,8 @@ class NumericCall:
             if len(closed):
                 moved = (q[closed, 0] - inside) / newton.units
                 nearest = closed[np.argmin((moved**2).sum(axis=1))]
-                return IKSolutions.of_packed(q[nearest].copy(), _FOUND, self._shared)
+                solution: Array = q[nearest, 0]
+                return solution
         return None
 
     def _search(self, seed: int) -> NumericSearch:

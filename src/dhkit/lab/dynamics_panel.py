@@ -118,5 +118,5 @@ def _formula(arm: Arm, name: str, job: Job) -> JsonObject:
         "terms": terms,
         "error": None
         if fits
-        else f"{name} has {terms} terms: dhkit equations writes them to a file",
+        else f"{name} has {terms} terms, too many to show; dhkit equations writes them to a file",
     }

@@ -9,6 +9,7 @@ const NAMES = ["points", "ellipsoids", "ghosts", "companion", "obstacles"];
 const ROD = 0.0035; // radius of a skeleton's rods, share of its size
 const NONE = new Uint8Array(0);
 const SAME = 1e-4; // m and rad
+const BEHIND = 300; // by which a ghost is drawn farther away, in steps of the depth: about 15 mm for an arm of 1 m
 const GHOST = 0.3,
   BALL = 0.3; // opacities
 
@@ -209,8 +210,8 @@ class Layer {
 // Translucent copies of an arm's nodes but the first: the base stands where the arm's own does.
 function ghostOf(nodes, [r, g, b], THREE) {
   const color = new THREE.Color(r / 255, g / 255, b / 255);
-  // A ghost that is where the arm is lies behind it, and does not flicker through its surface.
-  const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 };
+  // A ghost that is nearly where the arm is lies behind it, and does not flicker through its surface.
+  const behind = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: BEHIND };
   const material = new THREE.MeshLambertMaterial({
     color,
     transparent: true,

@@ -18,6 +18,8 @@ const SAMPLES = 60; // states of an animation that the camera must take in
 const SOLID_GHOSTS = 2; // more are drawn as skeletons beside panels
 const GREY = [148, 156, 168]; // of ghosts
 const REST = 400; // ms without a change after which the picture is drawn finely
+const LONG_REST = 900; // the same, with shadows, which take a processor three times as long
+const FLOOR = 4; // edge of the floor that takes shadows, share of the arm's size: none falls farther away
 const FINEST = 2; // pixels of the picture for one of the page
 const TRACE_RADIUS = 0.0035; // share of the arm's size
 const BESIDE = 0.5; // from the base to the person, share of the arm's size
@@ -39,7 +41,8 @@ export class Stage {
     pane.append(renderer.domElement);
     this.viewer = new MeshCat.Viewer(pane, false, renderer);
     this.ratio = Math.min(devicePixelRatio, FINEST);
-    this.fine = false; // whether the picture on show is drawn finely
+    this.sharp = false; // whether the picture on show is drawn finely
+    this.fine = false; // whether it is drawn as finely as can be, with shadows
     this.changed = 0; // ms, when the last picture of a motion was drawn
     this.labels = new Labels(labels);
     this.names = new Labels(names); // of ghosts
@@ -59,6 +62,7 @@ export class Stage {
     this.light();
     this.quality = new Quality([() => this.withoutShadows(), () => this.withoutGloss()]);
     this.plain = false;
+    this.shadowsAtRest = false; // whether only pictures at rest have shadows
     this.given = new Trace(this.viewer.scene, THREE);
     this.drawn = new Trace(this.viewer.scene, THREE);
     this.trail = new Trail(this.viewer.scene, THREE);
@@ -115,10 +119,16 @@ export class Stage {
     this.viewer.scene.add(new THREE.Mesh(new THREE.SphereGeometry(0, 3, 2), like));
   }
 
+  // Shadows wait, as smooth edges do, until nothing moves.
   withoutShadows() {
-    this.key.castShadow = false;
-    this.floor.visible = false;
+    this.shadowsAtRest = true;
+    this.castShadows(false);
     this.dirty();
+  }
+
+  castShadows(cast) {
+    this.key.castShadow = cast;
+    this.floor.visible = cast;
   }
 
   withoutGloss() {
@@ -270,7 +280,7 @@ export class Stage {
     shadow.updateProjectionMatrix();
     this.key.shadow.bias = -0.0015;
     this.key.shadow.normalBias = 0.004 * size;
-    this.floor.scale.setScalar(6 * size);
+    this.floor.scale.setScalar(FLOOR * size);
     this.floor.position.z = -0.0005 * size;
   }
 
@@ -646,7 +656,7 @@ export class Stage {
     const { viewer } = this;
     if (now < this.awaited) return;
     if (!viewer.needs_render) return this.refine(now);
-    if (this.fine) viewer.renderer.setPixelRatio(this.ratio);
+    if (this.refines) this.drawFinely(false, !this.shadowsAtRest);
     this.fine = false;
     this.changed = now;
     this.trail.upload();
@@ -660,12 +670,27 @@ export class Stage {
     this.names.place((ghost) => (named ? this.project(this.anchors[ghost]) : null));
   }
 
-  // Draw a picture that has not changed for a while at a higher resolution, which the browser averages.
+  // Draw a picture that has not changed for a while at a higher resolution, which the browser averages, then with shadows.
   refine(now) {
-    if (!this.software || this.fine || now - this.changed < REST || this.ratio >= FINEST) return;
-    this.fine = true;
-    this.viewer.renderer.setPixelRatio(FINEST);
+    const still = now - this.changed;
+    if (!this.refines || this.fine || still < REST) return;
+    const shadows = !this.shadowsAtRest || still >= LONG_REST;
+    if (this.sharp && !shadows) return;
+    this.drawFinely(true, shadows);
+    this.fine = shadows;
     this.viewer.render();
+  }
+
+  get refines() {
+    return this.software && this.ratio < FINEST;
+  }
+
+  // A coarse line covers a whole pixel and a fine one half of it: the grid looks the same in both.
+  drawFinely(sharp, shadows) {
+    if (sharp !== this.sharp) this.viewer.renderer.setPixelRatio(sharp ? FINEST : this.ratio);
+    if (shadows !== this.key.castShadow) this.castShadows(shadows);
+    if (this.grid) this.grid.material.opacity = sharp ? 1 : this.ratio / FINEST;
+    this.sharp = sharp;
   }
 
   // A point of the world in px from the pane's upper left corner; null behind the camera.

@@ -1,7 +1,7 @@
 // An answer for this robot: how it was read, whether it is right, and what went wrong.
 
 import { h } from "./dom.js";
-import { formula } from "./formula.js";
+import { formulaLines } from "./formula.js";
 
 const KINDS = [
   ["lines", "Equations, one a line: M11 = …"],
@@ -10,6 +10,7 @@ const KINDS = [
   ["matlab", "MATLAB (as text)"],
   ["sheet", "Answer sheet (TOML)"],
 ];
+const BORDERS = 26; // px at the left and the right of an answer in the report
 const EXAMPLE = "M11 = ...\ng2 = ...";
 
 export class AnswersPanel {
@@ -92,8 +93,13 @@ export class AnswersPanel {
   }
 
   entry({ name, verdict, passes, read, text, statement, difference, difference_text, witness }) {
+    const width = this.report.clientWidth - BORDERS;
     const shown = (mathml, otherwise) =>
-      h("div", { class: "wide" }, formula(mathml) ?? h("code", {}, otherwise ?? ""));
+      h(
+        "div",
+        { class: "wide entry" },
+        formulaLines(mathml, width) ?? h("code", {}, otherwise ?? ""),
+      );
     return h(
       "article",
       { class: passes ? "right" : "wrong" },

@@ -280,7 +280,7 @@ class GainTable {
             "tr",
             {},
             ["joint", "Kp", "Ki", "Kd"].map((name) => h("th", { scope: "col" }, name)),
-            h("th", { scope: "col", title: "Real part of the slowest pole, 1/s" }, "pole [1/s]"),
+            h("th", { scope: "col", title: "Real part of the slowest pole, 1/s" }, "pole, 1/s"),
           ),
         ),
         this.body,

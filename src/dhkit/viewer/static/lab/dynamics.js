@@ -5,7 +5,14 @@ import { fixed, h } from "./dom.js";
 import { FollowingPanel } from "./following.js";
 import { formula } from "./formula.js";
 
-const FACTS = ["half axes [m/s], joint rates of norm 1", "manipulability", "condition number"];
+const FACTS = ["half axes [m/s]", "manipulability", "condition number"];
+const COLUMN = 58; // px, widest of the mass matrix
+// Digits of the mass matrix, by the number of joints from which on they are so few: the matrix fits the panel.
+const DIGITS = [
+  [8, 2],
+  [7, 3],
+  [0, 4],
+];
 
 export class DynamicsPanel extends FollowingPanel {
   constructor(lab, root) {
@@ -13,6 +20,7 @@ export class DynamicsPanel extends FollowingPanel {
     this.note = h("p", { class: "note", role: "status" });
     this.bars = h("div", { class: "bars" });
     this.heading = h("h2", {}, "Gravity torques");
+    this.key = h("span", { class: "key", hidden: true }, h("b"), "limit");
     this.inertia = h("h2", {}, "Mass matrix");
     this.torques = null; // of a controller or a motion, by joint; gravity's where there are none
     this.matrix = h("div", { class: "wide" });
@@ -32,7 +40,7 @@ export class DynamicsPanel extends FollowingPanel {
     this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
     root.append(
       this.note,
-      this.heading,
+      h("div", { class: "line" }, this.heading, this.key),
       this.bars,
       this.inertia,
       this.matrix,
@@ -48,6 +56,11 @@ export class DynamicsPanel extends FollowingPanel {
           {},
           FACTS.map((name, k) => h("tr", {}, h("th", { scope: "row" }, name), this.facts[k])),
         ),
+      ),
+      h(
+        "p",
+        { class: "hint" },
+        "The ellipsoid has the velocities that the tool reaches with joint rates of norm 1.",
       ),
     );
   }
@@ -103,7 +116,8 @@ export class DynamicsPanel extends FollowingPanel {
     const tau = this.torques?.tau ?? g ?? [],
       largest = Math.max(1e-9, ...tau.map(Math.abs));
     this.heading.textContent = this.torques?.title ?? "Gravity torques";
-    this.rows.forEach(({ bar, mark, value }, i) => {
+    let limits = false;
+    this.rows.forEach(({ bar, marks, value }, i) => {
       const limit = effort[i],
         share = Math.min(1, Math.abs(tau[i]) / largest),
         unit = joints[i].unit === "m" ? "N" : "N m";
@@ -111,17 +125,22 @@ export class DynamicsPanel extends FollowingPanel {
       bar.style.left = tau[i] < 0 ? `${50 - 50 * share}%` : "50%";
       bar.classList.toggle("over", limit !== null && Math.abs(tau[i]) > limit);
       value.textContent = `${fixed(tau[i], 2)} ${unit}`;
-      // The limit is a mark where the scale of the bars, the largest torque, reaches it.
+      // A limit is a mark on both sides where the scale of the bars, the largest torque, reaches it.
       const place = limit === null ? Infinity : limit / largest;
-      mark.hidden = place > 1;
-      mark.style.left = `${50 + 50 * place * (tau[i] < 0 ? -1 : 1)}%`;
+      marks.forEach((mark, side) => {
+        mark.hidden = place > 1;
+        mark.style.left = `${50 + (side ? 50 : -50) * place}%`;
+      });
+      limits ||= place <= 1;
       value.title =
         limit === null ? "" : `${fixed((100 * Math.abs(tau[i])) / limit, 0)} % of the limit`;
     });
+    this.key.hidden = !limits;
+    const [, digits] = DIGITS.find(([least]) => joints.length >= least);
     if (M)
       this.cells.forEach((row, i) =>
         row.forEach((cell, j) => {
-          const text = fixed(M[i][j], 4);
+          const text = fixed(M[i][j], digits);
           cell.textContent = text;
           cell.classList.toggle("small", Number(text) === 0);
         }),
@@ -145,10 +164,14 @@ export class DynamicsPanel extends FollowingPanel {
     const slides = arm.joints.map((joint) => joint.unit === "m");
     this.inertia.textContent = `Mass matrix [${slides.every(Boolean) ? "kg" : slides.some(Boolean) ? "kg m², kg m, kg" : "kg m²"}]`;
     this.rows = bodies
-      ? arm.joints.map(() => ({ bar: h("i"), mark: h("b"), value: h("span", { class: "value" }) }))
+      ? arm.joints.map(() => ({
+          bar: h("i"),
+          marks: [h("b"), h("b")],
+          value: h("span", { class: "value" }),
+        }))
       : [];
     this.bars.replaceChildren(
-      ...this.rows.map(({ bar, mark, value }, i) =>
+      ...this.rows.map(({ bar, marks, value }, i) =>
         h(
           "div",
           { class: "bar" },
@@ -157,12 +180,12 @@ export class DynamicsPanel extends FollowingPanel {
             {
               type: "button",
               class: "quiet",
-              title: `formula of g${i + 1}`,
+              title: `${arm.joints[i].name}: formula of g${i + 1}`,
               onclick: ask(`g${i + 1}`),
             },
             arm.joints[i].name,
           ),
-          h("span", { class: "track" }, bar, mark),
+          h("span", { class: "track" }, bar, marks),
           value,
         ),
       ),
@@ -183,7 +206,7 @@ export class DynamicsPanel extends FollowingPanel {
     this.matrix.replaceChildren(
       h(
         "table",
-        { class: "numbers dense" },
+        { class: "numbers dense", style: `max-width:${COLUMN * arm.n}px` },
         h(
           "tbody",
           {},

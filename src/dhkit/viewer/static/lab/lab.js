@@ -173,6 +173,7 @@ export class Lab {
       body.hidden = i !== k;
       panel.shown?.(i === k);
     });
+    this.panels[k].tab.scrollIntoView({ block: "nearest", inline: "nearest" });
     remember("tab", this.panels[k].name);
   }
 

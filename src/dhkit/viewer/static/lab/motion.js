@@ -81,6 +81,11 @@ export class MotionPanel {
     );
     this.facts = h("p", { class: "facts" });
     this.points = h("ol", { class: "points" });
+    this.forget = h(
+      "button",
+      { type: "button", disabled: true, onclick: () => lab.ask("waypoints.clear") },
+      "Clear",
+    );
     this.file = new MotionFile(lab);
     this.curves = new MotionCurves(lab);
     this.obstacles = new ObstacleList(lab);
@@ -99,16 +104,17 @@ export class MotionPanel {
     );
     this.files = h(
       "div",
-      { class: "buttons", hidden: true },
-      this.replay,
-      h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
-      h("span", {}, "Save:"),
-      download("csv"),
-      download("npz"),
-      this.video,
+      { class: "rows", hidden: true },
+      h(
+        "div",
+        { class: "buttons" },
+        this.replay,
+        h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
+      ),
+      h("div", { class: "buttons" }, "Save:", download("csv"), download("npz"), this.video),
     );
     root.append(
-      h("div", { class: "line" }, this.kind, h("label", { class: "goal" }, "to ", this.goal)),
+      h("div", { class: "line choice" }, this.kind, h("label", {}, "to", this.goal)),
       this.circle,
       h("div", { class: "line" }, h("label", {}, "in ", this.duration, " s"), this.go, this.cancel),
       this.job,
@@ -122,7 +128,7 @@ export class MotionPanel {
           "div",
           { class: "buttons" },
           h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"),
-          h("button", { type: "button", onclick: () => lab.ask("waypoints.clear") }, "Clear"),
+          this.forget,
         ),
         this.points,
       ),
@@ -146,6 +152,7 @@ export class MotionPanel {
 
   take_waypoints(points) {
     this.waypoints = points;
+    this.forget.disabled = !points.length;
     this.points.replaceChildren(
       ...points.map((point, index) =>
         h(

@@ -79,6 +79,7 @@ export class ToolPanel {
       "Remove the target",
     );
     this.branches = h("div", { class: "branches", role: "group", "aria-label": "Branches" });
+    this.count = h("h2", { hidden: true });
     this.jog = this.jogs();
     root.append(h("h2", {}, "Pose of the tool"), this.pose, this.matrix);
     if (lab.can("tool.target"))
@@ -86,6 +87,7 @@ export class ToolPanel {
         h("div", { class: "buttons" }, this.grab, this.clear),
         this.note,
         this.jog,
+        this.count,
         this.branches,
       );
     else root.append(this.note);
@@ -258,12 +260,15 @@ export class ToolPanel {
     );
     const focused = document.activeElement?.dataset?.branch;
     const branches = target?.branches ?? [],
+      within = branches.filter((branch) => branch.within).length,
       ghosts = branches.filter((branch) => !branch.chosen);
     this.branches.replaceChildren(
       ...branches.map((branch) =>
         this.branch(branch, branch.chosen ? null : ghosts.indexOf(branch)),
       ),
     );
+    this.count.hidden = branches.length < 2;
+    this.count.textContent = `${branches.length} solutions, ${within} within the limits`;
     this.name(ghosts);
     if (focused) this.branches.querySelector(`[data-branch="${CSS.escape(focused)}"]`)?.focus();
     this.show();

@@ -274,9 +274,15 @@ export class TransformsPanel {
           h(
             "tr",
             {},
-            h("th", { scope: "col" }, "vertex"),
-            h("th", { scope: "colgroup", colSpan: 3 }, "before: x, y, z [m]"),
-            h("th", { scope: "colgroup", colSpan: 3 }, "after: x, y, z [m]"),
+            h("th", { scope: "col", rowSpan: 2 }, "vertex"),
+            ["before [m]", "after [m]"].map((title) =>
+              h("th", { scope: "colgroup", colSpan: 3 }, title),
+            ),
+          ),
+          h(
+            "tr",
+            {},
+            ["x", "y", "z", "x", "y", "z"].map((axis) => h("th", { scope: "col" }, axis)),
           ),
         ),
         h("tbody", {}, rows),

@@ -1,12 +1,12 @@
 // What the tool reaches, as points or a slice, and how far it is from the boundary.
 
-import { fixed, h } from "./dom.js";
+import { UNITS, fixed, h } from "./dom.js";
 import { FollowingPanel } from "./following.js";
 
 const KINDS = [
   ["none", "nothing"],
-  ["points", "points that the tool reaches"],
-  ["slice", "a slice through axis 1 and the tool"],
+  ["points", "points the tool reaches"],
+  ["slice", "slice through axis 1 and tool"],
 ];
 
 export class WorkspacePanel extends FollowingPanel {
@@ -31,10 +31,10 @@ export class WorkspacePanel extends FollowingPanel {
     this.hint = h(
       "p",
       { class: "hint" },
-      "The boundary leaves the limits of revolute joints out; the points keep all limits.",
+      "The boundary ignores the limits of revolute joints; the points keep all limits.",
     );
     root.append(
-      h("label", { class: "line" }, "Show ", this.kind),
+      h("label", { class: "line choice" }, "Show", this.kind),
       h("div", { class: "buttons" }, this.again),
       this.note,
       this.heat,
@@ -60,13 +60,24 @@ export class WorkspacePanel extends FollowingPanel {
         ? `sampling … ${progress}`
         : kind === "none"
           ? ""
-          : [`${count} points`, about].filter(Boolean).join("; "));
+          : [`${count.toLocaleString("en")} points`, about].filter(Boolean).join("; "));
   }
 
-  show({ distance, boundary, point }) {
-    this.distance.textContent =
-      distance === null
-        ? "not known in closed form for this arm: the points show it"
-        : `${fixed(1000 * distance, 1)} mm from the ${boundary} boundary${point === "tool" ? "" : ` (of the ${point})`}`;
+  show(numbers) {
+    this.numbers = numbers;
+    const { distance, boundary, point } = numbers;
+    const { scale, digits, sign } = UNITS[this.lab.units.length];
+    this.distance.replaceChildren(
+      ...(distance === null
+        ? ["not known in closed form for this arm: the points show it"]
+        : [
+            h("b", {}, `${fixed(scale * distance, digits)}${sign}`),
+            ` from the ${point} to the ${boundary} boundary`,
+          ]),
+    );
+  }
+
+  unitsChanged() {
+    if (this.numbers) this.show(this.numbers);
   }
 }
