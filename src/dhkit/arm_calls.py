@@ -14,7 +14,7 @@ from dhkit.errors import DescriptionError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
-from dhkit.kinematics.numeric_call import NumericCall
+from dhkit.kinematics.numeric_call import NumericCall, numeric_call
 from dhkit.kinematics.pose_call import PoseCall, pose_call
 from dhkit.kinematics.solutions import IKSolutions
 
@@ -105,7 +105,7 @@ class ArmCalls:
         if name == "ik":
             call = pose_call(self._description)
         elif name == "ik_numeric":
-            call = NumericCall(self._description)
+            call = numeric_call(self._description)
         elif name in _QUANTITIES:
             call = self._single_call(name)
         else:

@@ -315,7 +315,9 @@ def test_no_kernel_calls_anything(name):
             if "call " in line
         }
         widths = ("v8f64", "f64")
-        operations = {f"llvm.{name}.{kind}" for name in ("fabs", "sqrt", "floor") for kind in widths}
+        operations = {
+            f"llvm.{name}.{kind}" for name in ("fabs", "sqrt", "floor") for kind in widths
+        }
         assert called <= operations | {"run"}
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from dhkit import Arm, pose
+from dhkit.description import from_dh, library_robot
 from dhkit.errors import ModelError, UnreachableError
-from dhkit.kinematics import singular_configurations
+from dhkit.kinematics import follow_path, forward_kinematics, singular_configurations
 
 
 def line(T, to, count=200):
@@ -172,3 +173,38 @@ def test_a_start_some_turns_away_ends_inside_the_limits_and_is_said():
     assert ((path.q >= numbers.lower) & (path.q <= numbers.upper)).all()
     assert path.start > 2 * np.pi
     assert arm.ik_path(arm.fk(q0)[None], q0).start < 1e-9
+
+
+def test_an_arm_of_seven_joints_follows_a_line_by_iteration():
+    arm = library_robot("panda")
+    q0 = np.array([0.1, -0.7, 0.2, -2.2, 0.1, 1.6, 0.8])
+    T = np.repeat(forward_kinematics(arm, q0)[None], 60, axis=0)
+    T[:, 0, 3] -= np.linspace(0, 0.2, 60)
+    for limits in (True, False):
+        path = follow_path(arm, T, q0, limits=limits)
+        assert path.ok and set(path.branch) == {"numeric"} and path.start < 1e-9
+        assert np.abs(forward_kinematics(arm, path.q) - T).max() < 1e-11
+        assert np.abs(np.diff(path.q, axis=0)).max() < 0.05
+    far = T.copy()
+    far[20:25, 0, 3] = 5.0
+    path = follow_path(arm, far, q0)
+    assert path.lost == tuple(range(20, 25)) and not path.switches
+    assert path.branch[20] == "" and path.branch[25] == "numeric"
+
+
+def test_joints_without_limits_go_on_through_whole_turns_by_iteration():
+    # Six joints in general position, which no closed form covers, and no limits.
+    rows = [
+        (0, 0.3, 0.1, 1.2),
+        (0, 0.1, 0.4, 0.3),
+        (0, 0.05, 0.3, -1.0),
+        (0, 0.2, 0.1, 0.9),
+        (0, 0.1, 0.05, -1.3),
+        (0, 0.1, 0.02, 0.4),
+    ]
+    arm = from_dh(rows)
+    q0 = np.array([0.2, 0.4, -0.6, 0.3, 0.8, -0.2])
+    q = q0 + np.linspace(0, 2.5 * 2 * np.pi, 400)[:, None] * np.eye(6)[0]
+    path = follow_path(arm, forward_kinematics(arm, q), q0)
+    assert path.ok
+    assert np.abs(path.q - q).max() < 1e-6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,18 @@ _PACKED = struct.Struct(f"{_SIZE + 1}d")
 """The error, 6 numbers, and whether T is a pose, 1 or 0."""
 _FOUND = struct.pack("=d?BB", 0.0, True, 0, IKStatus.ok)
 """Distance, valid, flags and status of a pose that is reached, as :meth:`IKSolutions.of_packed` reads them."""
+
+
+@lru_cache(maxsize=64)
+def numeric_call(description: Description) -> NumericCall:
+    """Return the function of an arm, the same one each time.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    return NumericCall(description)
 
 
 class NumericCall:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -15,10 +16,17 @@ from dhkit.kernels import pose_rows
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
+from dhkit.kinematics.numeric import solve_numerically
+from dhkit.kinematics.numeric_call import numeric_call
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
+from dhkit.kinematics.solver import solver_of
 
 _MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
+_WHOLE = 6
+"""Fewest joints of an arm that reaches whole poses."""
+_TOLERANCE = 1e-12
+"""Largest error of poses that are reached by iteration: share of the reach, and rad."""
 _NEAR_SINGULAR = 0.02
 """A pose counts as near a singularity if a singular value of its Jacobian, lengths over the reach, is below this."""
 
@@ -102,8 +110,8 @@ def follow_path(
     Parameters
     ----------
     description
-        The robot; one whose inverse kinematics have a closed form. Through ssik others are followed as well, but the
-        path of a redundant arm may jump: its solutions are samples.
+        The robot. One without a closed form, of six joints or more, is followed by iteration, from each pose to the
+        next; a redundant one moves by the shortest joint steps, so that a closed path need not end where it began.
     T
         Poses of the tool in the world, shape (N, 4, 4), near enough to each other for joints to move less than 45
         degrees (or an eighth of the reach) between them.
@@ -122,7 +130,7 @@ def follow_path(
     ValueError
         T has not shape (N, 4, 4), or q0 not (n,) or not finite.
     ModelError
-        The arm has no closed form, and ssik is not installed or does not take it.
+        The arm has no closed form and fewer than six joints.
 
     Examples
     --------
@@ -137,10 +145,11 @@ def follow_path(
     if poses.ndim != 3:
         raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
     q0 = joint_vector(description, q0, "q0")
+    if solver_of(description) is None and description.n >= _WHOLE:
+        return _followed_by_iteration(description, poses, q0, limits)
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.allowed if limits else solutions.valid
-    # pi/4 rad, or for a prismatic joint pi/4 (reach / (2 pi)): an eighth of the reach.
-    jump = _MAX_STEP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
+    jump = _largest_steps(description)
     q = np.full((len(poses), description.n), np.nan)
     places = np.full(len(poses), -1)
     switches = []
@@ -174,6 +183,55 @@ def follow_path(
         near_singular=_near_singular(
             description, q, "whole" if len(solutions.met) == 6 else "translational"
         ),
+    )
+
+
+def _largest_steps(description: Description) -> Array:
+    """Return the largest motion of each joint between two poses, shape (n,), rad and m."""
+    # pi/4 rad, or for a prismatic joint pi/4 (reach / (2 pi)): an eighth of the reach.
+    in_length = description.reach / 2 / np.pi
+    steps: Array = _MAX_STEP * np.where(description.numbers.prismatic, in_length, 1.0)
+    return steps
+
+
+def _followed_by_iteration(
+    description: Description, poses: Array, q0: Array, limits: bool
+) -> IKPath:
+    """Return the path of an arm without a closed form: each pose is searched for from the joint values before."""
+    numbers = description.numbers
+    is_endless = ~numbers.prismatic
+    if limits:
+        is_endless = is_endless & np.isinf(numbers.upper - numbers.lower)
+    call = numeric_call(description)
+    jump = _largest_steps(description)
+    q = np.full((len(poses), description.n), np.nan)
+    switches = []
+    lost: list[int] = []
+    at = q0
+    for k, T in enumerate(poses):
+        found = call(T, at, _TOLERANCE, 0) if limits else None
+        if found is None:
+            found = solve_numerically(description, T, at, tolerance=_TOLERANCE, limits=limits)
+        if not found.valid[0]:
+            lost.append(k)
+            continue
+        # Angles of joints without limits are in (-pi, pi]: the whole turns of the joints before are added.
+        turns = np.rint((at - found.q[0]) / math.tau)
+        q[k] = found.q[0] + np.where(is_endless, math.tau * turns, 0.0)
+
+        # After a lost pose joints may have moved by more than a step, which is not a jump.
+        if k and lost[-1:] != [k - 1] and np.any(np.abs(q[k] - at) > jump):
+            switches.append(k)
+        at = q[k]
+    is_reached = ~np.isnan(q).any(axis=1)
+    reached = q[is_reached]
+    return IKPath(
+        q=q,
+        branch=tuple("numeric" if one else "" for one in is_reached),
+        switches=tuple(switches),
+        lost=tuple(lost),
+        start=float(np.abs(reached[0] - q0).max()) if len(reached) else float("nan"),
+        near_singular=_near_singular(description, q, "whole"),
     )
 
 
