@@ -17,10 +17,13 @@ RESULTS = HERE.parent / "benchmarks" / "results"
 QUANTITIES = {
     "fk": "forward kinematics",
     "ik": "inverse kinematics",
+    "ik_numeric": "numeric inverse kinematics",
     "jacobian": "Jacobian",
     "inverse_dynamics": "inverse dynamics",
     "mass_matrix": "mass matrix",
     "forward_dynamics": "forward dynamics",
+    "inverse_dynamics_derivatives": "derivatives of inverse dynamics",
+    "regressor": "regressor",
 }
 ACCURACY = {
     "kinematics": (
@@ -111,8 +114,9 @@ def speed_table(mode: str) -> str:
 
 
 def without_closed_form() -> str:
-    """Return the table of an arm without closed form: docs/peers_panda.json, by the command that its page names."""
-    found = json.loads((HERE / "peers_panda.json").read_text("utf-8"))
+    """Return the table of an arm without closed form."""
+    found = read("kinematics_panda")
+    found["rows"] = [row for row in found["rows"] if row["quantity"] in ("ik", "ik_numeric")]
     return table(SPEED_HEAD, speed_rows(found, "single")) + "\n" + machine(found) + "\n"
 
 

@@ -204,7 +204,7 @@ def assert_same(found, expected):
 
 @pytest.mark.filterwarnings("ignore:the matrix subclass")
 def test_unusual_arguments_give_the_same_values_and_exceptions(puma, tmp_path, law):
-    for seed in range(law.samples(50, quick=1)):
+    for seed in range(law.samples(1000, quick=1)):
         rng = np.random.default_rng(seed)
         plain = rng.normal(size=puma.n)
         for method, count in STATES.items():

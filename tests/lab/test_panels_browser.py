@@ -19,6 +19,8 @@ PRINTED = 5.1e-5
 """Half of the last digit of an entry of M, and rounding."""
 HALF_A_DIGIT = 5.1e-4
 """Half of the last digit of a vertex on the page, m, and rounding."""
+HALF_A_DIGIT_OF_A_LENGTH = 5.1e-5
+"""The same of a length in the unit of the page, m."""
 TORQUE = 5.1e-3
 """N m: the same of a torque."""
 HOSTILE = '<img src=x onerror="globalThis.hacked=1">'
@@ -74,6 +76,39 @@ def test_torques_are_those_of_the_motion_or_the_controller_that_moves_the_arm(op
     page.until(f"{heading} === 'Gravity torques'")
 
 
+def test_limits_of_torques_are_marked_on_both_sides_where_they_are_in_the_scale(kept_page):
+    lab, page = kept_page("puma560")
+    panel(page, "dynamics")
+    page.until("document.querySelectorAll('#panel-dynamics .bar').length === 6")
+    set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
+    g = lab.desk.arm.gravity_torque(lab.desk.q)
+    limit = lab.desk.arm.description.numbers.effort / np.abs(g).max()
+    page.until(
+        f"Math.abs(parseFloat(document.querySelectorAll('#panel-dynamics .bar .value')[1].textContent) - {g[1]}) < {TORQUE}"
+    )
+    marks = page.evaluate(
+        "[...document.querySelectorAll('#panel-dynamics .bar')]"
+        ".map(bar => [...bar.querySelectorAll('b')].map(b => b.hidden ? null : parseFloat(b.style.left)))"
+    )
+    for share, places in zip(limit, marks, strict=True):
+        if share > 1:
+            assert places == [None, None]
+        else:
+            assert places == pytest.approx([50 - 50 * share, 50 + 50 * share], abs=0.1)
+    assert any(limit <= 1)
+    assert not page.evaluate("document.querySelector('#panel-dynamics .key').hidden")
+
+
+def test_the_mass_matrix_of_seven_joints_fits_the_panel(kept_page):
+    _, page = kept_page("panda")
+    panel(page, "dynamics")
+    page.until("document.querySelectorAll('#panel-dynamics td button').length === 49")
+    assert page.evaluate(
+        "[...document.querySelectorAll('#panel-dynamics .wide, #panel-dynamics td button, #panel-dynamics .bar button')]"
+        ".every(e => e.scrollWidth <= e.clientWidth + 1)"
+    )
+
+
 def test_an_arm_without_masses_says_what_to_do(open_page):
     _, page = open_page(Arm.from_dh([[0, 0.4, 0, "pi/2"], [0, 0, 0.3, 0]]))
     panel(page, "dynamics")
@@ -97,12 +132,14 @@ def test_the_workspace_is_drawn_and_the_distance_is_live(kept_page):
     for q in ([0.3, 0.4], [1.0, 2.0]):
         set_joints(lab, page, q)
         radius = float(np.linalg.norm(lab.desk.arm.fk(q)[:3, 3]))
-        distance = 1000 * min(
+        distance = min(
             l1 + l2 - radius, abs(radius - abs(l1 - l2)) if abs(l1 - l2) > 1e-6 else np.inf
         )
         page.until(
-            f"Math.abs(parseFloat(document.querySelector('#panel-workspace .distance').textContent) - {distance}) < 0.051"
+            f"Math.abs(parseFloat(document.querySelector('#panel-workspace .distance').textContent) - {distance}) < {HALF_A_DIGIT_OF_A_LENGTH}"
         )
+    page.evaluate("dhkit.lab.setUnits({ length: 'mm' })")
+    assert texts(page, "#panel-workspace .distance")[0].startswith(f"{1000 * distance:.1f} mm from")
     page.choose(labelled("Workspace"), "none")
     page.until("dhkit.stage.overlays.layers.points.group.children.length === 0")
 
@@ -162,6 +199,27 @@ def test_an_answer_is_judged_on_the_page(kept_page):
     assert texts(page, "#panel-answers .verdict") == ["0 of 1 right"]
     assert page.evaluate("document.querySelectorAll('img').length") == 0
     assert page.evaluate("globalThis.hacked ?? null") is None
+
+
+def test_a_long_sum_is_broken_before_its_signs_into_lines_that_fit(kept_page):
+    _, page = kept_page("planar2r")
+    panel(page, "answers")
+    terms = "<mo>+</mo>".join(
+        f"<mn>{k}.2345678</mn><msub><mi>c</mi><mn>{k}</mn></msub>" for k in range(1, 9)
+    )
+    text = f"<math><mrow><mo>\u2212</mo>{terms}</mrow></math>"
+    width = 250
+    lines, whole, widths = page.evaluate(
+        f"import('./lab/formula.js').then(({{ formula, formulaLines }}) => {{ const text = {json.dumps(text)};"
+        f" const box = document.createElement('div'); box.className = 'entry'; box.append(...formulaLines(text, {width}));"
+        " document.getElementById('panel-answers').append(box); const lines = [...box.children];"
+        " const found = [lines.map(e => e.textContent), formula(text).textContent, lines.map(e => e.getBoundingClientRect().width)];"
+        " box.remove(); return found; })"
+    )
+    assert len(lines) > 1
+    assert "".join(lines) == whole
+    assert all(line.startswith("+") for line in lines[1:])
+    assert max(widths) <= width
 
 
 def test_formulas_take_over_mathematics_alone(kept_page):
@@ -283,3 +341,52 @@ def test_a_motion_is_saved_as_a_video(open_page):
     assert bytes(head) == b"\x1aE\xdf\xa3"  # EBML
     assert size > 5_000
     page.until("!dhkit.player.playing")
+
+
+def test_on_a_phone_the_chosen_tab_is_in_view_and_the_player_is_not_covered(open_page):
+    lab, page = open_page("puma560", width=390, height=844)
+    lab.answer(
+        "motion.plan", {"kind": "quintic", "goal": {"q": (0.9 * lab.desk.q + 0.01).tolist()}}
+    )
+    page.until("dhkit.lab.state.motion && !document.getElementById('player').hidden")
+    for name in ("transforms", "joints", "control"):
+        page.evaluate(f"dhkit.lab.openPanel('{name}')")
+        page.settle()
+        left, right = page.evaluate(
+            f"(({{ left, right }}) => [left, right])(document.getElementById('tab-{name}').getBoundingClientRect())"
+        )
+        assert left >= -1
+        assert right <= 391
+    boxes = page.evaluate(
+        "['#dock header > button', '#player', '#world', '#lab'].map(s => document.querySelector(s).getBoundingClientRect())"
+        ".map(({ left, top, right, bottom }) => [left, top, right, bottom])"
+    )
+    for k, (left, top, right, bottom) in enumerate(boxes):
+        for other in boxes[k + 1 :]:
+            assert right <= other[0] or other[2] <= left or bottom <= other[1] or other[3] <= top
+
+
+def test_the_scene_has_shadows_once_it_is_at_rest(kept_page):
+    lab, page = kept_page("puma560")
+    page.until("dhkit.stage.fine")
+    assert page.evaluate("dhkit.stage.key.castShadow && dhkit.stage.floor.visible")
+    set_joints(lab, page, (lab.desk.q + 0.05).tolist())
+    page.until("!dhkit.stage.fine")
+    page.until("dhkit.stage.fine")
+    assert page.evaluate("dhkit.stage.key.castShadow")
+
+
+def test_the_axes_of_the_world_and_the_grid_are_explained(kept_page):
+    _, page = kept_page("puma560")
+    assert texts(page, "#world span") == ["grid 0.2 m"]
+    page.evaluate("dhkit.lab.setUnits({ length: 'mm' })")
+    assert texts(page, "#world span") == ["grid 200 mm"]
+    page.evaluate("dhkit.stage.look('top')")
+    page.settle()
+    ends = page.evaluate(
+        "dhkit.lab.world.axes.map(g => [g.children[0].getAttribute('x2'), g.children[0].getAttribute('y2')].map(Number))"
+    )
+    lengths = np.linalg.norm(ends, axis=1)
+    assert lengths[2] < 1  # z points at the camera
+    assert lengths[:2] == pytest.approx(24, abs=0.5)
+    page.evaluate("dhkit.stage.resetCamera()")

@@ -54,7 +54,11 @@ def items_within(task: Task, mode: Mode, max_items: int) -> int:
         seconds = _seconds_of(call)
         room = BUDGET[mode] / max(seconds, 1e-9)
         if items == max_items or room < 2.0:
-            return max(1, int(items * min(1.0, room)))
+            fitting = max(1, int(items * min(1.0, room)))
+            if mode is Mode.FEW:
+                # Whole calls of every size.
+                return min(max_items, max(1, fitting // FEWEST) * FEWEST)
+            return fitting
         items = min(max_items, items * int(min(room, 16.0)))
 
 

@@ -160,8 +160,7 @@ def _few(size: int, quantity: str) -> Callable[[Workload], Task]:
         blocks = [tuple(x[k * size : (k + 1) * size] for x in filled) for k in range(count)]
 
         def prepare(items: int) -> Call:
-            # As many calls as the items fill, one at least.
-            return one_by_one(function, blocks)(max(1, items // size))
+            return one_by_one(function, blocks)(-(-items // size))
 
         def first_answers(wanted: int) -> list[Array]:
             answers: list[Array] = []
