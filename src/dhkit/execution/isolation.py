@@ -96,6 +96,12 @@ def find_isolation(
     ------
     IsolationError
         It is required, and none works.
+
+    Examples
+    --------
+    >>> isolation = find_isolation()
+    >>> bool(isolation) or "not isolated" in str(isolation)
+    True
     """
     reference = importlib.util.find_spec("pinocchio")
     folders = [

@@ -44,6 +44,15 @@ def fill(
     ------
     ValueError
         The batch axes do not broadcast, ``out`` has another shape, type or layout, or ``threads`` is below 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dhkit.description import library_robot
+    >>> from dhkit.kinematics.forward import tool_kernel
+    >>> run, parameters = tool_kernel(library_robot("planar2r"))
+    >>> fill(run, parameters, [np.zeros((5, 3, 2))], (4, 4)).shape
+    (5, 3, 4, 4)
     """
     if threads != 1:
         check_whole("threads", threads, 1)

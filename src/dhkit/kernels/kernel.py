@@ -331,6 +331,18 @@ def kernel(
     -------
     Kernel
         The kernel, interpreted until compiling pays.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> import numpy as np
+    >>> p, x = casadi.SX.sym("p"), casadi.SX.sym("x")
+    >>> program = Graph.of("scaled", {"parameters": p, "x": x}, {"y": p * x})
+    >>> run = kernel("scaled", "", lambda: program)
+    >>> y = np.empty((3, 1))
+    >>> run(np.array([2.0]), [np.array([[1.0], [2.0], [3.0]])], [y])
+    >>> y.ravel()
+    array([2., 4., 6.])
     """
     found = _kernels.get((name, pattern))
     if found is None:

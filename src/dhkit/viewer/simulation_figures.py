@@ -79,6 +79,14 @@ def plot_simulation(result: SimulationResult) -> Figure:
     -------
     Figure
         A figure of matplotlib; a notebook shows it, ``savefig`` writes it.
+
+    Examples
+    --------
+    >>> from dhkit import Arm, PDGravity
+    >>> arm = Arm.load("planar2r")
+    >>> run = arm.simulate(PDGravity(arm, kp=50, kd=10), [0.5, 0.2], 0.5, q0=[0, 0])
+    >>> len(plot_simulation(run).axes)
+    5
     """
     description = result.description
     kinds = joint_kinds(result.description)
@@ -122,6 +130,18 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
     ------
     ValueError
         There is no result, or the arms have different kinds of joints.
+
+    Examples
+    --------
+    >>> from dhkit import Arm, PDGravity
+    >>> arm = Arm.load("planar2r")
+    >>> gains = {"soft": 20, "stiff": 80}
+    >>> runs = {
+    ...     name: arm.simulate(PDGravity(arm, kp=kp, kd=10), [0.5, 0.2], 0.5, q0=[0, 0])
+    ...     for name, kp in gains.items()
+    ... }
+    >>> [axes.get_xlabel() for axes in plot_comparison(runs).axes]
+    ['time [s]', 'RMS of the joint that errs most [rad]']
     """
     layout_engine = imported("matplotlib.layout_engine", "a figure")
 

@@ -101,6 +101,15 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
         There is no motion, or a joint has no such limit.
     DescriptionError
         Motions are of different robots, or a link has no body.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> arm = Arm.load("puma560")
+    >>> ends = [arm.configurations["nominal"], arm.configurations["ready"]]
+    >>> motions = {f"{T} s": arm.quintic(*ends, duration=T) for T in (1.0, 2.0)}
+    >>> len(plot_uses(motions).axes)
+    4
     """
     if not motions:
         raise ValueError("motions is empty; expected trajectories by their names")
