@@ -137,12 +137,13 @@ def _entry(name: str, n: int, task: Requirements) -> str:
 
 
 def _table_lines(description: Description, *, is_asked: bool) -> Iterator[str]:
-    """Yield an empty table in comments: rows of empty entries would be read as a table that cannot be."""
+    """Yield a table whose rows are in comments: rows of empty entries would be read as a table that cannot be."""
+    mark = "" if is_asked else "# "
     yield ""
+    yield f"{mark}[answer.dh]                # theta, d, a, alpha; SI and radians"
+    yield f'{mark}convention = "{description.convention.value}"'
     if is_asked:
-        yield "# The table is asked for: fill it in, and take away the first # of its lines."
-    yield "# [answer.dh]                # theta, d, a, alpha; SI and radians"
-    yield f'# convention = "{description.convention.value}"'
+        yield "# Fill the rows in, and take away the # before them."
     yield "# rows = [" + ", ".join('["", "", "", ""]' for _ in range(description.n)) + "]"
 
 

@@ -197,8 +197,7 @@ def _properties() -> Schema:
         "names": _table(KEYS["names"], keys, "The student's own names."),
         "task": _table(KEYS["task"], keys, "What was asked for, where there is a choice."),
         "answer": _answer(
-            dh=_table(KEYS["dh"], keys, "A table: theta, d, a, alpha by row.")
-            | {"required": ["rows"]},
+            dh=_table(KEYS["dh"], keys, "A table: theta, d, a, alpha by row."),
             ik=_table(KEYS["ik"], keys, "Inverse kinematics: formulas of branches, or steps.")
             | {"oneOf": [{"required": ["branches"]}, {"required": ["steps"]}]},
         ),

@@ -353,9 +353,12 @@ def _packages(checker: _Checker, data: Mapping[str, object]) -> tuple[str, ...]:
 
 def _table(
     checker: _Checker, data: Mapping[str, object]
-) -> tuple[str, tuple[tuple[str, ...], ...]]:
+) -> tuple[str, tuple[tuple[str, ...], ...]] | None:
+    """Return the convention and the rows of a table; None of one without rows, which is not filled in."""
     checker.keys(data, KEYS["dh"], "answer.dh.")
-    rows = data.get("rows")
+    if "rows" not in data:
+        return None
+    rows = data["rows"]
     if not isinstance(rows, list) or not rows:
         raise checker.error("answer.dh.rows", rows, "a list of rows [theta, d, a, alpha]")
     texts = tuple(
