@@ -193,7 +193,6 @@ def test_steps_of_an_empty_sheet_are_those_to_fill_in(tmp_path):
             "answer = { A2 = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], V = [['m1']], g = [] }",
         ),
         ("sheet", "answer = { dh = { rows = [[0, 0, 0, 0], ['q2', '0', 0.5, 'pi/2']] } }"),
-        ("sheet", "answer = { dh = { convention = 'standard' } }"),
         ("task", "task = { asked = ['dh', 'ik', 'A1', 'A1'] }"),
         ("rubric", "points = 0.5\nweights = { A1 = 1, A1_14 = 0, tau = 1e6 }"),
     ],
