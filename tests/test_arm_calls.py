@@ -12,7 +12,7 @@ import sys
 import threading
 import types
 import warnings
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -23,6 +23,7 @@ from acceptance import DIFFERENT_ROBOTS, only_accepting
 from dhkit import Arm, dynamics, kinematics
 from dhkit.kernels import single_calls
 from dhkit.kernels.call_source import MAX_ITEMS
+from dhkit.kinematics.programs import kinematic_kernels
 from random_arms import arms, tables
 
 STATES = {
@@ -73,9 +74,14 @@ def compiled(arm):
     return arm
 
 
+@cache
+def compiled_robot(name):
+    return compiled(Arm.load(name))
+
+
 @pytest.fixture(scope="module")
 def puma():
-    return compiled(Arm.load("puma560"))
+    return compiled_robot("puma560")
 
 
 def is_builtin(function):
@@ -84,7 +90,7 @@ def is_builtin(function):
 
 @pytest.mark.parametrize("name", DIFFERENT_ROBOTS)
 def test_values_are_those_of_the_ordinary_way(name, law):
-    arm = compiled(Arm.load(name))
+    arm = compiled_robot(name)
     rng = np.random.default_rng(0)
     for method, count in STATES.items():
         fast = getattr(arm._calls, method)
@@ -269,8 +275,9 @@ def test_a_result_may_lie_where_an_input_lies(puma):
 
 @pytest.mark.parametrize("name", ["planar2r", "puma560", "stanford", "panda"])
 def test_a_state_gets_the_same_bits_alone_and_in_a_compiled_batch(name):
-    arm = compiled(Arm.load(name))
-    arm.compile()
+    arm = compiled_robot(name)
+    for kernel in [*kinematic_kernels(arm.description), *dynamics.dynamic_kernels(arm)]:
+        kernel.compile()
     states = np.random.default_rng(8).uniform(-3, 3, (3, 70, arm.n))
     for method, count in STATES.items():
         batch = ordinary(method)(arm, *states[:count])
@@ -300,7 +307,7 @@ def test_a_signal_handler_that_calls_the_same_function_changes_nothing(puma):
 
 
 def test_a_missing_acceleration_is_explained_by_the_ordinary_way(caplog):
-    arm = compiled(Arm.load("puma560"))
+    arm = compiled_robot("puma560")
     q = np.full(6, np.nan)
     assert arm._calls.forward_dynamics(q, q, q, None) is None
     out = np.ones(6)
@@ -462,7 +469,7 @@ def poses(arm, rng, count):
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
 def test_the_solutions_of_one_pose_are_those_of_the_ordinary_way(name, law):
-    arm = compiled(Arm.load(name))
+    arm = compiled_robot(name)
     rng = np.random.default_rng(7)
     taken = 0
     for T in poses(arm, rng, law.samples(2000, quick=20)):
@@ -487,7 +494,7 @@ def test_the_solutions_of_one_pose_are_those_of_the_ordinary_way(name, law):
 
 @pytest.mark.parametrize("name", CLOSED_FORMS)
 def test_the_solutions_of_few_poses_are_those_of_each(name):
-    arm = compiled(Arm.load(name))
+    arm = compiled_robot(name)
     T = arm.fk(np.random.default_rng(9).uniform(-1, 1, (7, arm.n)))
     few = arm.ik(T)
     assert "_packed" in vars(few)
@@ -554,7 +561,7 @@ def test_unusual_poses_give_the_same_values_and_exceptions(puma, tmp_path):
 
 @pytest.mark.parametrize("name", ["panda", "puma560", "cobra600", "stanford", "planar3r"])
 def test_one_pose_is_solved_as_the_ordinary_way_solves_it(name, law):
-    arm = compiled(Arm.load(name))
+    arm = compiled_robot(name)
     numbers = arm.description.numbers
     rng = np.random.default_rng(10)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -np.pi)

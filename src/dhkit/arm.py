@@ -829,7 +829,7 @@ class Arm:
         q0: ArrayLike | None = None,
         *,
         position_only: bool = False,
-        restarts: int = 63,
+        restarts: int = 511,
         tolerance: float = 1e-12,
         seed: int = 0,
         limits: bool = True,
@@ -878,7 +878,7 @@ class Arm:
         >>> str(found.status), found.q.shape
         ('ok', (1, 7))
         """
-        is_usual = not position_only and limits and restarts == 63 and progress is None
+        is_usual = not position_only and limits and restarts == 511 and progress is None
         if is_usual and threads == 1 and type(tolerance) is float and type(seed) is int:
             found = self._calls.ik_numeric(T, q0, tolerance, seed)
             if found is not None:

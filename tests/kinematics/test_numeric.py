@@ -17,13 +17,13 @@ from dhkit.kinematics import (
     inverse_kinematics,
     solve_numerically,
 )
-from dhkit.kinematics.newton import Newton
+from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.numeric import CHUNK
 from random_arms import states, tables
 
 CLOSES = 1e-12  # share of the reach and rad: the default tolerance
 ROUNDING = 1e-14  # what a last step of Newton leaves where nothing is singular
-FAILS = 0.005  # share of poses that a search with default settings may miss
+FAILS = 5e-4  # share of poses that a search with default settings may miss
 NEAR = 0.1  # rad, or share of the reach: where a search starts that is to find the solution nearby
 
 
@@ -255,7 +255,7 @@ def test_progress_counts_poses_and_may_end_the_work():
 def test_threads_change_nothing():
     arm = library_robot("ur5")
     q, T = inside(arm, 9_000, seed=10)
-    Arm(arm).compile()  # otherwise the first call may be interpreted, which differs by rounding
+    descent_kernel(arm, 6)[0].compile()  # interpreted code differs by rounding
     assert np.array_equal(solve_numerically(arm, T, q, threads=2).q, solve_numerically(arm, T, q).q)
 
 

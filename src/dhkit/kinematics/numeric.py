@@ -22,6 +22,9 @@ from dhkit.kinematics.solutions import IKSolutions
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with the number of finished poses and of all poses."""
 
+RESTARTS = 511
+"""Largest number of further starts unless another is asked for: of poses that arms in general position reach inside
+their limits, 99.99 % are found, and 99 % with 63 (their share of the time is a tenth)."""
 CHUNK = 8_192
 """Number of searches that run together; their arrays take about 5 MB."""
 _MIN_POSES_PER_THREAD = 64
@@ -41,7 +44,7 @@ def solve_numerically(
     q0: ArrayLike | None = None,
     *,
     position_only: bool = False,
-    restarts: int = 63,
+    restarts: int = RESTARTS,
     tolerance: float = 1e-12,
     seed: int = 0,
     limits: bool = True,

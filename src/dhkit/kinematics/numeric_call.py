@@ -7,15 +7,16 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.kernels import FastCall, SingleCall
+from dhkit.kernels.call_source import MAX_ITEMS
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.newton import Newton, closes, descent_kernel
-from dhkit.kinematics.numeric import NumericSearch, doubling
+from dhkit.kinematics.numeric import RESTARTS, NumericSearch, doubling
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 
-_DEFAULT_RESTARTS = 63
 _SIZE = 6
 """Number of coordinates of a pose that is to be reached."""
 _PACKED = struct.Struct(f"{_SIZE + 1}d")
@@ -134,23 +135,35 @@ class NumericCall:
         newton = self._newton
         inside = newton.inside(first)
         starts = self._search(seed).starts(T.reshape(1, 16))[0]
-        for begin, end in doubling(_DEFAULT_RESTARTS):
-            count = end - begin
-            goals = np.broadcast_to(T, (count, 4, 4)).copy()
-            tolerances = np.full((count, 1), tolerance)
-            q, packed = self._call(goals, starts[begin:end].copy(), tolerances, None)
-            error = np.frombuffer(packed).reshape(count, _SIZE + 1)[:, :_SIZE]
-            closed = np.flatnonzero(closes(error, tolerance))
+        for begin, end in doubling(RESTARTS):
+            q, is_closed = self._descended(T, starts[begin:end], tolerance)
+            closed = np.flatnonzero(is_closed)
             if len(closed):
-                moved = (q[closed, 0] - inside) / newton.units
+                moved = (q[closed] - inside) / newton.units
                 nearest = closed[np.argmin((moved**2).sum(axis=1))]
-                solution: Array = q[nearest, 0]
+                solution: Array = q[nearest]
                 return solution
         return None
+
+    def _descended(
+        self, T: Array, starts: Array, tolerance: float
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Return where searches for one pose from starts (k, n) end, shape (k, n), and whether they close."""
+        ends = []
+        closed = []
+        for begin in range(0, len(starts), MAX_ITEMS):
+            some = starts[begin : begin + MAX_ITEMS].copy()
+            count = len(some)
+            goals = np.broadcast_to(T, (count, 4, 4)).copy()
+            q, packed = self._call(goals, some, np.full((count, 1), tolerance), None)
+            error = np.frombuffer(packed).reshape(count, _SIZE + 1)[:, :_SIZE]
+            ends.append(q[:, 0])
+            closed.append(closes(error, tolerance))
+        return np.concatenate(ends), np.concatenate(closed)
 
     def _search(self, seed: int) -> NumericSearch:
         """Return the search whose starts are used, kept for its random joint positions."""
         if seed not in self._searches:
             self._searches.clear()
-            self._searches[seed] = NumericSearch(self._newton, 1.0, _DEFAULT_RESTARTS, seed)
+            self._searches[seed] = NumericSearch(self._newton, 1.0, RESTARTS, seed)
         return self._searches[seed]
