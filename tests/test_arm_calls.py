@@ -627,3 +627,122 @@ def test_few_poses_are_solved_as_the_ordinary_way_solves_them(puma):
     some = T.copy()
     some[3, 0, 3] = 50.0
     assert puma.ik_numeric(some).status[3] == "out_of_reach"
+
+
+# Found by an adversary
+
+FREED = """
+import ctypes, gc
+class Filler:
+    def __del__(self):
+        global held
+        held = [ctypes.create_string_buffer(b"\\xff" * 32, 32) for _ in range(20000)]
+class Ring: pass
+own = type("Own", (Arm,), {{}}).load("planar2r")
+own.__dict__["own"] = own
+own._calls._single_call("fk").compile()
+ring = Ring(); ring.ring = ring; ring.filler = np.array([Filler(), None], object)
+gc.freeze(); gc.unfreeze(); del own, ring; gc.collect()
+"""
+
+
+def test_the_cycle_collector_leaves_a_function_what_it_needs():
+    done = in_new_process(FREED.format(), PYTHONMALLOC="malloc")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+FORBIDDEN = """
+import ctypes
+if ctypes.CDLL(None).prctl(65, 1, 0, 0, 0) == 0:  # PR_SET_MDWE of Linux
+    for _ in range(300): arm.mass_matrix(q)
+    for t in threading.enumerate():
+        if t is not threading.current_thread(): t.join()
+    assert type(arm._calls.mass_matrix).__name__ == "function"
+    assert np.isfinite(arm.mass_matrix(np.zeros((70000, 2)))).all()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a rule of Linux")
+def test_where_memory_may_not_become_executable_nothing_is_compiled(tmp_path):
+    done = in_new_process(FORBIDDEN, DHKIT_CACHE_DIR=str(tmp_path))
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("start", [np.full(6, 0.3 + 2j), np.array(["0.3"] * 6), np.ones(6, bool)])
+def test_a_start_of_another_type_is_refused_for_few_poses_too(puma, start):
+    T = np.stack([puma.fk(np.linspace(-1, 1, 6))] * 2)
+    found = outcome(puma.ik_numeric, T, start)
+    expected = outcome(kinematics.solve_numerically, puma, T, start)
+    if isinstance(expected, tuple):
+        assert found == expected
+    else:
+        assert np.allclose(found.q, expected.q, rtol=0, atol=1e-6)
+
+
+def test_fields_are_those_of_the_call_whatever_becomes_of_out():
+    arm = compiled_robot("irb140")
+    T = arm.fk(np.linspace(-1, 1, 6))
+    out = np.empty((8, 6))
+    found = arm.ik(T, out=out)
+    out.shape = (48,)
+    assert "_packed" in vars(found) and found.valid.shape == (8,)
+
+
+@pytest.mark.parametrize("threads", [1.0, True, np.array([1]), np.array([1, 1]), 0, "1"])
+def test_threads_that_are_not_one_are_refused_as_before(puma, threads):
+    q = np.linspace(-1, 1, 6)
+    T = puma.fk(q)
+    for method, function, argument in (
+        (puma.fk, kinematics.forward_kinematics, q),
+        (puma.ik, kinematics.inverse_kinematics, T),
+        (puma.ik_numeric, kinematics.solve_numerically, T),
+    ):
+        found = outcome(method, argument, threads=threads)
+        expected = outcome(function, puma, argument, threads=threads)
+        if isinstance(expected, tuple):
+            assert found == expected
+        else:
+            assert type(found) is type(expected)
+
+
+def test_far_poses_and_huge_shapes_are_told_as_before(puma):
+    T = puma.fk(np.linspace(-1, 1, 6))
+    T[0, 3] = 1e200
+    with np.errstate(all="raise"):
+        for poses in (T, np.stack([T, T])):
+            assert np.all(puma.ik_numeric(poses).status == "out_of_reach")
+    for shape in ((10**15, 4, 0), (10**15, 0, 4)):
+        for method, function in (
+            (puma.ik, kinematics.inverse_kinematics),
+            (puma.ik_numeric, kinematics.solve_numerically),
+        ):
+            assert outcome(method, np.empty(shape)) == outcome(function, puma, np.empty(shape))
+    assert outcome(puma.ik_numeric, T, tolerance=1e200) == outcome(
+        kinematics.solve_numerically, puma, T, tolerance=1e200
+    )
+
+
+@settings(max_examples=acceptance.sample_size(100, quick=4))
+@given(arms(least=6))
+def test_searches_of_random_arms_are_compiled(description):
+    arm = Arm(description)
+    arm._calls.ik_numeric.compile()
+    assert is_builtin(arm._calls.ik_numeric._call)
+
+
+def test_code_of_another_kernel_is_not_run(tmp_path):
+    code = (
+        "from dhkit import Arm\n"
+        "arm = Arm.load('planar2r')\n"
+        "for _ in arm._calls.compile(): pass\n"
+        "print(type(arm._calls.fk).__name__)"
+    )
+    environment = {"DHKIT_CACHE_DIR": str(tmp_path)}
+    assert in_new_process(code, **environment).returncode == 0
+    folder = tmp_path / "kernels"
+    (fk,) = folder.glob("forward_kinematics_call_*.kernel")
+    (gravity,) = folder.glob("gravity_torque_call_*.kernel")
+    fk.write_bytes(gravity.read_bytes())
+    done = in_new_process(code, **environment)
+    assert done.stdout.strip() == "builtin_function_or_method"
+    assert "damaged; the kernel is compiled anew" in done.stderr

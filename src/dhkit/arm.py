@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Unpack
+from typing import TYPE_CHECKING, Final, Literal, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -65,6 +65,10 @@ if TYPE_CHECKING:
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
     from dhkit.viewer import View
+
+
+_ONE_THREAD: Final = 1
+"""The number of threads of a single call, by identity: 1.0 and True go the ordinary way, which refuses them."""
 
 
 class Arm:
@@ -602,7 +606,7 @@ class Arm:
         >>> arm.fk(np.zeros((1000, 2))).shape
         (1000, 4, 4)
         """
-        if threads == 1 and (T := self._calls.fk(q, out)) is not None:
+        if threads is _ONE_THREAD and (T := self._calls.fk(q, out)) is not None:
             return T
         from dhkit.kinematics import forward_kinematics
 
@@ -635,7 +639,7 @@ class Arm:
         >>> Arm.load("planar2r").frames([0, 0])[:, 0, 3]      # x of the origins
         array([0. , 0.5, 0.9])
         """
-        if threads == 1 and (T := self._calls.frames(q, out)) is not None:
+        if threads is _ONE_THREAD and (T := self._calls.frames(q, out)) is not None:
             return T
         from dhkit.kinematics import frames
 
@@ -680,7 +684,11 @@ class Arm:
                [0.9, 0.4],
                [1. , 1. ]])
         """
-        if threads == 1 and frame == "world" and (J := self._calls.jacobian(q, out)) is not None:
+        if (
+            threads is _ONE_THREAD
+            and frame == "world"
+            and (J := self._calls.jacobian(q, out)) is not None
+        ):
             return J
         from dhkit.kinematics import jacobian
 
@@ -726,7 +734,11 @@ class Arm:
         (6,)
         """
         is_world = frame == "world"
-        if threads == 1 and is_world and (Jd := self._calls.jacobian_dot(q, qd, out)) is not None:
+        if (
+            threads is _ONE_THREAD
+            and is_world
+            and (Jd := self._calls.jacobian_dot(q, qd, out)) is not None
+        ):
             return Jd
         from dhkit.kinematics import jacobian_dot
 
@@ -779,7 +791,11 @@ class Arm:
         >>> bool(np.allclose(arm.fk(solutions.q), T))
         True
         """
-        if seed is None and threads == 1 and (found := self._calls.ik(T, out)) is not None:
+        if (
+            seed is None
+            and threads is _ONE_THREAD
+            and (found := self._calls.ik(T, out)) is not None
+        ):
             return found
         from dhkit.kinematics import inverse_kinematics
 
@@ -878,8 +894,9 @@ class Arm:
         >>> str(found.status), found.q.shape
         ('ok', (1, 7))
         """
-        is_usual = not position_only and limits and restarts == 511 and progress is None
-        if is_usual and threads == 1 and type(tolerance) is float and type(seed) is int:
+        is_usual = position_only is False and limits is True and progress is None
+        is_usual = is_usual and type(restarts) is int and restarts == 511
+        if is_usual and threads is _ONE_THREAD and type(tolerance) is float and type(seed) is int:
             found = self._calls.ik_numeric(T, q0, tolerance, seed)
             if found is not None:
                 return found
@@ -1141,7 +1158,7 @@ class Arm:
         array([[0.9217, 0.23  ],
                [0.23  , 0.08  ]])
         """
-        if threads == 1 and (M := self._calls.mass_matrix(q, out)) is not None:
+        if threads is _ONE_THREAD and (M := self._calls.mass_matrix(q, out)) is not None:
             return M
         from dhkit.dynamics import mass_matrix
 
@@ -1179,7 +1196,7 @@ class Arm:
         array([[-0.0631, -0.1893],
                [ 0.1262,  0.    ]])
         """
-        if threads == 1 and (C := self._calls.coriolis_matrix(q, qd, out)) is not None:
+        if threads is _ONE_THREAD and (C := self._calls.coriolis_matrix(q, qd, out)) is not None:
             return C
         from dhkit.dynamics import coriolis_matrix
 
@@ -1214,7 +1231,7 @@ class Arm:
         >>> Arm.load("planar2r").gravity_torque([0, 0]).round(3)
         array([15.206,  2.943])
         """
-        if threads == 1 and (g := self._calls.gravity_torque(q, out)) is not None:
+        if threads is _ONE_THREAD and (g := self._calls.gravity_torque(q, out)) is not None:
             return g
         from dhkit.dynamics import gravity_torque
 
@@ -1255,7 +1272,7 @@ class Arm:
         >>> bool(np.allclose(arm.bias(q, qd), h + arm.gravity_torque(q)))
         True
         """
-        if threads == 1 and (h := self._calls.bias(q, qd, out)) is not None:
+        if threads is _ONE_THREAD and (h := self._calls.bias(q, qd, out)) is not None:
             return h
         from dhkit.dynamics import bias
 
@@ -1310,7 +1327,7 @@ class Arm:
         """
         is_free = wrench is None and friction is False
         if (
-            threads == 1
+            threads is _ONE_THREAD
             and is_free
             and (torque := self._calls.inverse_dynamics(q, qd, qdd, out)) is not None
         ):
@@ -1367,7 +1384,7 @@ class Arm:
         """
         is_free = wrench is None and friction is False
         if (
-            threads == 1
+            threads is _ONE_THREAD
             and is_free
             and (qdd := self._calls.forward_dynamics(q, qd, tau, out)) is not None
         ):
@@ -1573,7 +1590,7 @@ class Arm:
         """
         if base:
             return self.base_parameters().regressor(q, qd, qdd)
-        if threads == 1 and (Y := self._calls.regressor(q, qd, qdd, out)) is not None:
+        if threads is _ONE_THREAD and (Y := self._calls.regressor(q, qd, qdd, out)) is not None:
             return Y
         from dhkit.dynamics import regressor
 
@@ -1618,7 +1635,7 @@ class Arm:
         array([[0.9217, 0.23  ],
                [0.23  , 0.08  ]])
         """
-        if threads == 1:
+        if threads is _ONE_THREAD:
             found = self._calls.inverse_dynamics_derivatives(q, qd, qdd, out)
             if found is not None:
                 return found
@@ -1665,7 +1682,7 @@ class Arm:
         array([[  3.842, -11.046],
                [-11.046,  44.256]])
         """
-        if threads == 1:
+        if threads is _ONE_THREAD:
             found = self._calls.forward_dynamics_derivatives(q, qd, tau, out)
             if found is not None:
                 return found

@@ -378,15 +378,15 @@ def test_the_scene_has_shadows_once_it_is_at_rest(kept_page):
 
 def test_the_axes_of_the_world_and_the_grid_are_explained(kept_page):
     _, page = kept_page("puma560")
-    assert texts(page, "#world span") == ["grid 0.2 m"]
+    assert texts(page, "#world small") == ["grid 0.2 m"]
     page.evaluate("dhkit.lab.setUnits({ length: 'mm' })")
-    assert texts(page, "#world span") == ["grid 200 mm"]
+    assert texts(page, "#world small") == ["grid 200 mm"]
     page.evaluate("dhkit.stage.look('top')")
     page.settle()
-    ends = page.evaluate(
-        "dhkit.lab.world.axes.map(g => [g.children[0].getAttribute('x2'), g.children[0].getAttribute('y2')].map(Number))"
+    widths, heights = page.evaluate(
+        "['width', 'height'].map(side => [...document.querySelectorAll('#world i')].map(e => e.getBoundingClientRect()[side]))"
     )
-    lengths = np.linalg.norm(ends, axis=1)
-    assert lengths[2] < 1  # z points at the camera
-    assert lengths[:2] == pytest.approx(24, abs=0.5)
+    # x points to the right, y up and z at the camera; a line is 2.4 px thick.
+    assert (widths[0], heights[1]) == pytest.approx((24, 24), abs=0.5)
+    assert max(heights[0], widths[1], widths[2], heights[2]) < 3
     page.evaluate("dhkit.stage.resetCamera()")

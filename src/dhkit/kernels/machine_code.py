@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import mmap
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
@@ -149,6 +150,7 @@ class CompiledFunction:
 def _loaded(code: bytes, name: str) -> tuple[Any, int]:
     """Return the owner of loaded object code, which must be kept, and the address of a function in it."""
     _start()
+    _require_executable_memory()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine(*processor()))
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -156,6 +158,24 @@ def _loaded(code: bytes, name: str) -> tuple[Any, int]:
     if not place:
         raise RuntimeError(f"object code without a function named {name}")
     return engine, place
+
+
+def _require_executable_memory() -> None:
+    """Check that written memory may become executable, which a system can forbid a process; LLVM would crash.
+
+    Raises
+    ------
+    OSError
+        It may not.
+    """
+    if not hasattr(mmap, "PROT_EXEC"):
+        return
+    with mmap.mmap(-1, mmap.PAGESIZE, prot=mmap.PROT_READ | mmap.PROT_WRITE) as page:
+        place = ctypes.addressof(ctypes.c_char.from_buffer(page))
+        protect = ctypes.CDLL(None, use_errno=True).mprotect
+        protect.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]
+        if protect(place, mmap.PAGESIZE, mmap.PROT_READ | mmap.PROT_EXEC):
+            raise OSError(ctypes.get_errno(), "memory may not become executable in this process")
 
 
 @cache

@@ -51,6 +51,8 @@ _GET_ABI = 0
 _ARRAY_TYPE = 2
 _NEW_ARRAY = 93
 """Indices in NumPy's C interface: ``PyArray_GetNDArrayCVersion``, ``PyArray_Type`` and ``PyArray_New``."""
+_SMALLEST_STACK = 2**18
+"""Smallest stack of a thread that LLVM is given, bytes; the usual ones have 8 MB."""
 _AGREEMENT = 1e-9
 """Largest difference from the ordinary way at which a new function is used, relative to the largest entry."""
 
@@ -129,14 +131,23 @@ class SingleCall:
         """Compile in a thread, unless one is at work; after a fork, the parent's thread is not alive in the child."""
         if self._thread is not None and self._thread.is_alive():
             return
+        if 0 < threading.stack_size() < _SMALLEST_STACK:
+            return
         self._thread = threading.Thread(
-            target=self.compile, name=f"compile {self._kernel.name}", daemon=False
+            target=self._compile_in_thread, name=f"compile {self._kernel.name}", daemon=False
         )
         try:
             self._thread.start()
         except RuntimeError:
             # The interpreter is shutting down.
             self._thread = None
+
+    def _compile_in_thread(self) -> None:
+        try:
+            self.compile()
+        except Exception as error:
+            log.warning("%s: single calls stay as they are (%s)", self._kernel.name, error)
+            self._install(never)
 
     def _compiled(self) -> FastCall:
         if self._kernel.mode == "off" or not is_supported():
@@ -184,6 +195,8 @@ def _different_states(shapes: Sequence[tuple[int, ...]]) -> list[Array]:
 def _are_near(found: Sequence[NDArray[Any]], expected: Sequence[NDArray[Any]]) -> bool:
     """Whether outputs agree to ``_AGREEMENT`` of their largest entry, and are NaN in the same entries."""
     for one, other in zip(found, expected, strict=True):
+        if one.size != other.size:
+            return False
         largest = np.abs(np.nan_to_num(other)).max(initial=1.0)
         difference = np.abs(one.ravel() - other.ravel().astype(float))
         same_missing = np.array_equal(np.isnan(one.ravel()), np.isnan(other.ravel()))
@@ -216,12 +229,6 @@ def unpacked(packed: bytes, program: Graph | Loop, types: Sequence[str]) -> list
     return outputs
 
 
-class _Context(np.ndarray[Any, Any]):
-    """Addresses that a function reads, see ``CONTEXT``; it keeps what they point to."""
-
-    kept: tuple[object, ...] = ()
-
-
 class _MethodDefinition(ctypes.Structure):
     """Python's ``PyMethodDef``."""
 
@@ -233,14 +240,22 @@ class _MethodDefinition(ctypes.Structure):
     )
 
 
+class _Owner:
+    """Owns the memory of a context, and all that its addresses point to."""
+
+    def __init__(self, addresses: NDArray[np.uintp], *kept: object) -> None:
+        self.__array_interface__ = addresses.__array_interface__
+        self.kept = (addresses, *kept)
+
+
 def _bound(code: CompiledCall, parameters: Array) -> FastCall:
     """Return machine code as a built-in function with these parameters.
 
-    The function refers to its context, and the context to the code, the definition and the numbers: all live as long as
-    the function does.
+    The function refers to its context, which is a plain array, and the array to its owner. The cycle collector does not
+    follow arrays: while the function lives, it cannot clear what the function needs, the method's definition included.
     """
     numbers = np.array(parameters, dtype=float, order="C")
-    context = np.array(
+    addresses = np.array(
         [
             id(np.ndarray),
             id(np.dtype(np.float64)),
@@ -250,9 +265,9 @@ def _bound(code: CompiledCall, parameters: Array) -> FastCall:
             *map(_python_function, CONTEXT[5:]),
         ],
         dtype=np.uintp,
-    ).view(_Context)
+    )
     definition = _MethodDefinition(b"single_call", code.address, _METH_FASTCALL, b"")
-    context.kept = (code, definition, numbers)
+    context = np.asarray(_Owner(addresses, code, definition, numbers))
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype = ctypes.py_object
     make.argtypes = [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]

@@ -31,6 +31,7 @@ PACKAGES = (
 )
 """Packages of dhkit whose sources determine the results of a kernel."""
 _SUFFIX = ".kernel"
+_SEAL_BYTES = hashlib.sha256().digest_size
 _VERSIONS = ("casadi", "llvmlite", "numpy")
 """Packages whose versions determine programs and machine code."""
 
@@ -137,9 +138,9 @@ def read(name: str, key: str) -> bytes | None:
     except OSError as error:
         log.warning("%s: %s; the kernel is compiled anew", path, error.strerror)
         return None
-    seal = content[: len(_seal(b""))]
-    code = content[len(_seal(b"")) :]
-    if seal != _seal(code):
+    seal = content[:_SEAL_BYTES]
+    code = content[_SEAL_BYTES:]
+    if seal != _seal(path.name, code):
         log.warning("%s: damaged; the kernel is compiled anew", path)
         return None
     return code
@@ -175,7 +176,7 @@ def write(name: str, key: str, code: bytes) -> None:
     try:
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
-        write_atomically(path, _seal(code) + code, private=True)
+        write_atomically(path, _seal(path.name, code) + code, private=True)
     except OSError as error:
         _warn_once(f"kernels are not cached: {folder}: {error.strerror}")
 
@@ -207,9 +208,9 @@ def _path(folder: Path, name: str, key: str) -> Path:
     return folder / f"{name}_{key}{_SUFFIX}"
 
 
-def _seal(code: bytes) -> bytes:
-    """Return the checksum that is stored before machine code, which detects files cut short."""
-    return hashlib.sha256(code).digest()
+def _seal(name: str, code: bytes) -> bytes:
+    """Return the checksum that is stored before machine code, which detects files cut short, renamed or exchanged."""
+    return hashlib.sha256(name.encode() + b"\0" + code).digest()
 
 
 @cache

@@ -17,6 +17,7 @@ from dhkit.kinematics.newton import Newton, closes, descent_kernel
 from dhkit.kinematics.numeric import RESTARTS, NumericSearch, doubling
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 
+_FLOAT = np.dtype(np.float64)
 _SIZE = 6
 """Number of coordinates of a pose that is to be reached."""
 _PACKED = struct.Struct(f"{_SIZE + 1}d")
@@ -49,20 +50,21 @@ class NumericCall:
         self._newton = newton
         self._n = description.n
         self._middle = newton.middle
-        self._searches: dict[int, NumericSearch] = {}
+        self._last_search: NumericSearch | None = None
         self._shared = {
             "branches": ("numeric",),
             "met": ALL_COORDINATES,
             "description": description,
             "complete": False,
         }
-        near = newton.middle + 0.1
+        # At a solution, where rounding is not amplified.
+        solution = newton.inside(newton.middle + 0.1)
         self._call: FastCall = SingleCall(
             kernel,
             np.concatenate([table, newton.parameters]),
             (1, description.n),
             install=self._install,
-            example=[world_to_tool(description, newton.inside(near)), newton.middle, np.ones(1)],
+            example=[world_to_tool(description, solution), solution, np.ones(1)],
         )
 
     def _install(self, call: FastCall) -> None:
@@ -87,11 +89,12 @@ class NumericCall:
         seed
             Seed of the random starts.
         """
-        if not tolerance > 0.0 or seed < 0:
+        if not 0.0 < tolerance < 1.0 or seed < 0:
             return None
         first = self._middle if q0 is None else q0
         if type(T) is np.ndarray and T.ndim == 3:
-            return self._few(T, first, tolerance, seed)
+            with np.errstate(all="ignore"):
+                return self._few(T, first, tolerance, seed)
         found = self._call(T, first, np.array([tolerance]), None)
         if found is None:
             return None
@@ -103,7 +106,8 @@ class NumericCall:
         # False where the start is not finite.
         if square <= tolerance * tolerance:
             return IKSolutions.of_packed(q, _FOUND, self._shared)
-        restarted = self._restarted(T, first, tolerance, seed)
+        with np.errstate(all="ignore"):
+            restarted = self._restarted(T, first, tolerance, seed)
         if restarted is None:
             return None
         return IKSolutions.of_packed(restarted[None], _FOUND, self._shared)
@@ -111,9 +115,13 @@ class NumericCall:
     def _few(self, T: Array, first: Any, tolerance: float, seed: int) -> IKSolutions | None:
         """Return the solutions of poses (N, 4, 4): searched for together, and restarted one by one."""
         count = len(T)
-        if type(first) is not np.ndarray or first.shape not in ((self._n,), (count, self._n)):
+        if count > MAX_ITEMS or T.shape[1:] != (4, 4):
             return None
-        starts = np.array(np.broadcast_to(first, (count, self._n)), dtype=float, order="C")
+        if type(first) is not np.ndarray or first.dtype is not _FLOAT:
+            return None
+        if first.shape not in ((self._n,), (count, self._n)):
+            return None
+        starts = np.array(np.broadcast_to(first, (count, self._n)), order="C")
         found = self._call(T, starts, np.full((count, 1), tolerance), None)
         if found is None:
             return None
@@ -163,7 +171,8 @@ class NumericCall:
 
     def _search(self, seed: int) -> NumericSearch:
         """Return the search whose starts are used, kept for its random joint positions."""
-        if seed not in self._searches:
-            self._searches.clear()
-            self._searches[seed] = NumericSearch(self._newton, 1.0, RESTARTS, seed)
-        return self._searches[seed]
+        search = self._last_search
+        if search is None or search.seed != seed:
+            search = NumericSearch(self._newton, 1.0, RESTARTS, seed)
+            self._last_search = search
+        return search

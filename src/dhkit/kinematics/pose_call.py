@@ -8,6 +8,7 @@ import numpy as np
 
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.kernels import FastCall, SingleCall
+from dhkit.kernels.call_source import MAX_ITEMS
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_of
@@ -60,6 +61,8 @@ class PoseCall:
         """
         no_seed = _NO_SEED
         if type(T) is np.ndarray and T.ndim == 3:
+            if len(T) > MAX_ITEMS or T.shape[1:] != (4, 4):
+                return None
             no_seed = np.zeros((len(T), 2))
         if self._needs_reach and out is not None and _may_share_memory(T, out):
             # The ordinary way may still need T.

@@ -99,7 +99,9 @@ class IKSolutions:
         """
         # Making an object as usual, and four arrays, would take longer than inverse kinematics.
         solutions = object.__new__(cls)
-        object.__setattr__(solutions, "__dict__", {**shared, "q": q, "_packed": packed})
+        object.__setattr__(
+            solutions, "__dict__", {**shared, "q": q, "_packed": packed, "_batch": q.shape[:-2]}
+        )
         return solutions
 
     def __getattr__(self, name: str) -> Any:
@@ -107,7 +109,9 @@ class IKSolutions:
         packed = self.__dict__.get("_packed")
         if packed is None or name not in ("distance", "valid", "flags", "status_code"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        *batch, B, _ = self.q.shape
+        # The caller may have changed the shape of ``q`` meanwhile, which is the array given as out=.
+        batch = self.__dict__["_batch"]
+        B = len(self.branches)
         of_pose = [
             ("distance", np.float64),
             ("valid", np.bool_, (B,)),
@@ -117,7 +121,8 @@ class IKSolutions:
         poses = np.frombuffer(packed, of_pose)
         for field in poses.dtype.names or ():
             values = poses[field].copy()
-            self.__dict__[field] = values.reshape((*batch, *values.shape[1:]))
+            # Of two threads that read first, both get the same arrays.
+            self.__dict__.setdefault(field, values.reshape((*batch, *values.shape[1:])))
         return self.__dict__[name]
 
     @property

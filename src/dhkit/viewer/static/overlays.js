@@ -20,6 +20,7 @@ export class Overlays {
     this.skeletons = new Skeletons(scene, THREE);
     this.dot = sprite(THREE);
     this.ballColor = new THREE.Color();
+    this.glow = 1; // factor of the colours of points: dark ones would not be seen on a dark ground
     this.solidColor = new THREE.Color();
     this.marked = null; // index of the obstacle that is chosen
   }
@@ -46,7 +47,9 @@ export class Overlays {
       group.visible = visible;
   }
 
-  color(balls, solids) {
+  color(balls, solids, glow) {
+    this.glow = glow;
+    this.layers.points.group.traverse((object) => object.material?.color.setScalar(glow));
     this.ballColor.set(balls);
     this.solidColor.set(solids);
     this.layers.ellipsoids.group.traverse((object) => object.material?.color.set(balls));
@@ -70,6 +73,7 @@ export class Overlays {
       points.length ? [new THREE.Points(geometry, new THREE.PointsMaterial(look))] : [],
       box,
     );
+    this.layers.points.group.traverse((object) => object.material?.color.setScalar(this.glow));
   }
 
   setEllipsoids({ transforms }) {

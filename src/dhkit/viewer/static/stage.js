@@ -147,7 +147,7 @@ export class Stage {
     this.sky.groundColor.set(dark ? 0x6a7080 : 0xb4b8c4);
     this.floor.material.opacity = dark ? 0.35 : 0.13;
     for (const trace of [this.given, this.drawn, this.trail]) trace.color(value("--accent"));
-    this.overlays.color(value("--accent"), value("--obstacle"));
+    this.overlays.color(value("--accent"), value("--obstacle"), Number(value("--glow")));
     this.outlines.color();
     this.dirty();
   }
@@ -691,6 +691,21 @@ export class Stage {
     if (shadows !== this.key.castShadow) this.castShadows(shadows);
     if (this.grid) this.grid.material.opacity = sharp ? 1 : this.ratio / FINEST;
     this.sharp = sharp;
+  }
+
+  // The axes of the world in the camera's frame: x to the right, y up, z towards the eye.
+  axesInView() {
+    const { matrixWorldInverse } = this.viewer.camera;
+    return [0, 1, 2].map((k) =>
+      inView(new THREE.Vector3().setComponent(k, 1)).transformDirection(matrixWorldInverse),
+    );
+  }
+
+  // Distance between the lines of the grid, m: its first half are lines along x at multiples of it.
+  gridStep() {
+    const { array } = this.grid.geometry.attributes.position;
+    const heights = array.slice(0, array.length / 2).filter((y, i) => i % 3 === 1 && y > 0);
+    return heights.reduce((a, b) => Math.min(a, b));
   }
 
   // A point of the world in px from the pane's upper left corner; null behind the camera.

@@ -31,17 +31,12 @@ export class AnswersPanel {
     this.send = h(
       "button",
       {
-        type: "button",
         class: "main",
         onclick: () => lab.ask("answers.grade", { kind: this.kind.value, text: this.text.value }),
       },
       "Judge",
     );
-    this.cancel = h(
-      "button",
-      { type: "button", hidden: true, onclick: () => lab.ask("answers.cancel") },
-      "Cancel",
-    );
+    this.cancel = h("button", { hidden: true, onclick: () => lab.ask("answers.cancel") }, "Cancel");
     this.parameters = h("p", { class: "hint" });
     this.note = h("p", { class: "note", role: "status" });
     this.report = h("div", { class: "report" });

@@ -24,7 +24,7 @@ export class ObstacleList {
     );
     this.list = h("ul", { class: "around" });
     const adding = KINDS.map(([kind, text]) =>
-      h("button", { type: "button", onclick: () => this.add(kind) }, text),
+      h("button", { onclick: () => this.add(kind) }, text),
     );
     this.root = h(
       "fieldset",
@@ -96,7 +96,6 @@ export class ObstacleList {
     const name = h(
       "button",
       {
-        type: "button",
         class: "quiet",
         onclick: () => this.choose(this.chosen === index ? null : index),
       },
@@ -117,7 +116,6 @@ export class ObstacleList {
     const remove = h(
       "button",
       {
-        type: "button",
         class: "quiet",
         "aria-label": `Remove ${text}`,
         onclick: () => this.remove(index),

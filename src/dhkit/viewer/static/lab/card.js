@@ -1,5 +1,7 @@
 // The state on show, in numbers over the scene: joints between their limits, the tool's pose, and what is wrong with it.
+// In another corner of the scene the axes of the world, and the distance between the lines of the grid.
 
+import { AXES as COLORS } from "../colors.js";
 import { THREE } from "../stage.js";
 import { euler } from "../offline/kinematics.js";
 import { UNITS, beyond, fixed, h, touchingText } from "./dom.js";
@@ -7,6 +9,8 @@ import { remember, remembered } from "./memory.js";
 
 const AXES = ["x", "y", "z"];
 const WIDE = 1100; // px of a page that has room for the card
+const ARM = 24; // px from the origin of the drawn axes to the end of each
+const BEYOND = 7; // px from there to its name
 const PRIMES = ["", "\u2032", "\u2033"]; // of axes that have moved once and twice
 
 export class StatusCard {
@@ -57,7 +61,6 @@ export class StatusCard {
       h(
         "button",
         {
-          type: "button",
           "aria-pressed": String(this.lab.units[name] === unit),
           onclick: () => this.lab.setUnits({ [name]: unit }),
         },
@@ -193,4 +196,38 @@ export function axisName(order, k) {
 
 function text(element, words) {
   if (element.textContent !== words) element.textContent = words;
+}
+
+// The axes of the world as the camera sees them, and the distance between the lines of the grid.
+export class WorldAxes {
+  constructor(lab) {
+    this.lab = lab;
+    this.axes = AXES.map((name, k) =>
+      h("span", { style: `color:${COLORS[k]}` }, h("i"), h("b", {}, name)),
+    );
+    this.caption = h("small");
+    this.root = h("div", { id: "world" }, this.axes, this.caption);
+    lab.stage.rendered.push(() => this.draw());
+  }
+
+  draw() {
+    const { stage } = this.lab;
+    if (stage.grid.geometry !== this.grid) this.unitsChanged();
+    stage.axesInView().forEach(({ x, y, z }, k) => {
+      const [line, name] = this.axes[k].children;
+      const length = Math.hypot(x, y);
+      const to = ARM + BEYOND / Math.max(length, 1e-6);
+      line.style.transform = `rotate(${Math.atan2(-y, x)}rad) scaleX(${length})`;
+      name.style.transform = `translate(${to * x}px, ${-to * y}px)`;
+      this.axes[k].style.zIndex = Math.round(9 * z);
+    });
+  }
+
+  unitsChanged() {
+    const { scale, sign } = UNITS[this.lab.units.length];
+    const { stage } = this.lab;
+    if (!stage.grid) return;
+    this.grid = stage.grid.geometry;
+    this.caption.textContent = `grid ${Number((stage.gridStep() * scale).toPrecision(3))}${sign}`;
+  }
 }

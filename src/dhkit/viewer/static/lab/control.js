@@ -56,21 +56,16 @@ export class ControlPanel {
       type: "checkbox",
       onchange: () => change("compensate", this.compensate.checked),
     });
-    this.start = h(
-      "button",
-      { type: "button", class: "main", onclick: () => this.toggle() },
-      "Start",
-    );
-    this.pause = h("button", { type: "button", onclick: () => lab.ask("control.pause") }, "Pause");
+    this.start = h("button", { class: "main", onclick: () => this.toggle() }, "Start");
+    this.pause = h("button", { onclick: () => lab.ask("control.pause") }, "Pause");
     this.assume = h(
       "button",
-      { type: "button", hidden: true, onclick: () => lab.ask("bodies.assume") },
+      { hidden: true, onclick: () => lab.ask("bodies.assume") },
       "Assume uniform links",
     );
     this.planar = h(
       "button",
       {
-        type: "button",
         "aria-pressed": "false",
         title: "Joints 2 and 3 move, the others are locked: the two-link arm of many courses",
         onclick: () =>
@@ -96,14 +91,14 @@ export class ControlPanel {
       "aria-label": "Duration of the push, s",
       value: "0.2",
     });
-    this.pushing = h("button", { type: "button", onclick: () => this.push() }, "Push");
+    this.pushing = h("button", { onclick: () => this.push() }, "Push");
     this.curves = new RunCurves(lab);
     this.gains = new GainTable(
       (gains) => lab.ask("control.gains", gains),
       (text) => lab.complain(text),
     );
     const download = (format) =>
-      h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
+      h("button", { onclick: () => this.download(format) }, format.toUpperCase());
     root.append(
       h(
         "div",

@@ -25,7 +25,7 @@ export class PlotDock {
     });
     this.choice = h("div", { class: "choice", role: "group", "aria-label": "Curves of" });
     this.legend = h("div", { class: "names" });
-    this.fold = h("button", { type: "button", class: "quiet", onclick: () => this.toggle() });
+    this.fold = h("button", { class: "quiet", onclick: () => this.toggle() });
     this.row = h("div", { class: "row" });
     this.root = h(
       "section",
@@ -75,7 +75,6 @@ export class PlotDock {
             h(
               "button",
               {
-                type: "button",
                 "aria-pressed": String(curves === shown),
                 onclick: () => this.show(curves),
               },

@@ -27,7 +27,6 @@ export class DynamicsPanel extends FollowingPanel {
     this.ellipsoid = h(
       "button",
       {
-        type: "button",
         "aria-pressed": "false",
         onclick: () =>
           lab.ask("dynamics.ellipsoid", {
@@ -178,7 +177,6 @@ export class DynamicsPanel extends FollowingPanel {
           h(
             "button",
             {
-              type: "button",
               class: "quiet",
               title: `${arm.joints[i].name}: formula of g${i + 1}`,
               onclick: ask(`g${i + 1}`),
@@ -194,7 +192,6 @@ export class DynamicsPanel extends FollowingPanel {
       ? arm.joints.map((_, i) =>
           arm.joints.map((_, j) =>
             h("button", {
-              type: "button",
               class: "quiet",
               title: `formula of M${i + 1}${j + 1}`,
               "aria-label": `M${i + 1}${j + 1}`,

@@ -29,9 +29,7 @@ export class JointPanel {
   take_arm(arm) {
     this.arm = arm;
     this.named.replaceChildren(
-      ...arm.configurations.map((name) =>
-        h("button", { type: "button", onclick: () => this.go(name) }, name),
-      ),
+      ...arm.configurations.map((name) => h("button", { onclick: () => this.go(name) }, name)),
     );
     this.rows = arm.joints.map((joint, i) => this.row(joint, i));
     this.list.replaceChildren(...this.rows.map((row) => row.root));

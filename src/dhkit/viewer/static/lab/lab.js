@@ -1,6 +1,6 @@
 // The lab: panels beside the scene. Python has the arm; the page asks, and shows the states that it is told.
 
-import { StatusCard } from "./card.js";
+import { StatusCard, WorldAxes } from "./card.js";
 import { PlotDock } from "./dock.js";
 import { depthText, h } from "./dom.js";
 import { draggedEdge } from "./edge.js";
@@ -30,13 +30,13 @@ export class Lab {
 
   build(groups, first) {
     this.card = new StatusCard(this);
+    this.world = new WorldAxes(this);
     this.dock = new PlotDock(this);
     const bodies = [];
     this.panels = groups.flat().map(([name, title, Panel], k) => {
       const tab = h(
         "button",
         {
-          type: "button",
           role: "tab",
           id: `tab-${name}`,
           "aria-controls": `panel-${name}`,
@@ -77,7 +77,6 @@ export class Lab {
     this.copy = h(
       "button",
       {
-        type: "button",
         class: "quiet",
         title: "The lines of Python that do the same",
         hidden: !this.can("python"),
@@ -121,6 +120,7 @@ export class Lab {
     this.width = Number(remembered("width", String(innerWidth < 1000 ? SLIM : WIDTH)));
     this.folded = false;
     this.layout();
+    this.stage.pane.after(this.world.root);
     document.getElementById("stage").after(this.card.root, this.dock.root);
     this.addViews();
     const wanted = [remembered("tab", first), first].map((name) =>
@@ -316,7 +316,7 @@ export class Lab {
       { class: "text" },
       h("h2", {}, title),
       area,
-      h("button", { type: "button", onclick: close }, "Close"),
+      h("button", { onclick: close }, "Close"),
     );
     document.body.append(dialog);
     dialog.addEventListener("close", close);
@@ -341,7 +341,7 @@ export class Lab {
   }
 
   tellUnits() {
-    for (const part of [this.card, this.dock, ...this.panels.map(({ panel }) => panel)])
+    for (const part of [this.card, this.world, this.dock, ...this.panels.map(({ panel }) => panel)])
       part.unitsChanged?.();
   }
 }

@@ -31,11 +31,7 @@ export class MotionPanel {
       placeholder: "shortest",
       onkeydown: (event) => event.key === "Enter" && this.plan(),
     });
-    this.go = h(
-      "button",
-      { type: "button", class: "main", onclick: () => this.plan() },
-      "Plan from here",
-    );
+    this.go = h("button", { class: "main", onclick: () => this.plan() }, "Plan from here");
     this.plane = h(
       "select",
       { "aria-label": "Plane of the circle" },
@@ -70,7 +66,6 @@ export class MotionPanel {
     this.cancel = h(
       "button",
       {
-        type: "button",
         hidden: true,
         onclick: async () => {
           await lab.ask("motion.cancel");
@@ -83,19 +78,18 @@ export class MotionPanel {
     this.points = h("ol", { class: "points" });
     this.forget = h(
       "button",
-      { type: "button", disabled: true, onclick: () => lab.ask("waypoints.clear") },
+      { disabled: true, onclick: () => lab.ask("waypoints.clear") },
       "Clear",
     );
     this.file = new MotionFile(lab);
     this.curves = new MotionCurves(lab);
     this.obstacles = new ObstacleList(lab);
     const download = (format) =>
-      h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
-    this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
+      h("button", { onclick: () => this.download(format) }, format.toUpperCase());
+    this.replay = h("button", { onclick: () => this.play() }, "Play");
     this.video = h(
       "button",
       {
-        type: "button",
         hidden: videoFormat() === null,
         title: "Play the motion once and save it as a video",
         onclick: () => this.record(),
@@ -109,7 +103,7 @@ export class MotionPanel {
         "div",
         { class: "buttons" },
         this.replay,
-        h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
+        h("button", { onclick: () => lab.ask("motion.clear") }, "Remove"),
       ),
       h("div", { class: "buttons" }, "Save:", download("csv"), download("npz"), this.video),
     );
@@ -127,7 +121,7 @@ export class MotionPanel {
         h(
           "div",
           { class: "buttons" },
-          h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"),
+          h("button", { onclick: () => this.teach() }, "Teach this state"),
           this.forget,
         ),
         this.points,
@@ -161,7 +155,6 @@ export class MotionPanel {
           h(
             "button",
             {
-              type: "button",
               class: "quiet",
               onclick: () => this.lab.ask("waypoints.go", { index }),
             },
@@ -170,7 +163,6 @@ export class MotionPanel {
           h(
             "button",
             {
-              type: "button",
               class: "quiet",
               "aria-label": `Forget ${point.name}`,
               onclick: () => this.lab.ask("waypoints.remove", { index }),

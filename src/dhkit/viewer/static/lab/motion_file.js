@@ -23,7 +23,7 @@ export class MotionFile {
       h("label", {}, "times ", this.times),
       h("label", {}, "joint values ", this.values),
       h("label", {}, "rates ", this.rates),
-      h("button", { type: "button", onclick: () => this.readChosen() }, "Read these"),
+      h("button", { onclick: () => this.readChosen() }, "Read these"),
     );
     this.root = h(
       "fieldset",

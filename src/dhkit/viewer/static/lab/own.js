@@ -11,18 +11,13 @@ export class OwnPanel {
     this.ghosts = h(
       "button",
       {
-        type: "button",
         "aria-pressed": "false",
         onclick: () =>
           lab.ask("own.ghosts", { on: this.ghosts.getAttribute("aria-pressed") !== "true" }),
       },
       "Show my solutions",
     );
-    this.again = h(
-      "button",
-      { type: "button", onclick: () => lab.ask("own.score") },
-      "Score again",
-    );
+    this.again = h("button", { onclick: () => lab.ask("own.score") }, "Score again");
     this.score = h("div", { class: "score" });
     this.output = h("details", {}, h("summary", {}, "What it prints"), h("pre"));
     root.append(

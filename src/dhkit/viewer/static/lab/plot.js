@@ -37,7 +37,6 @@ export class Plot {
     this.csv = h(
       "button",
       {
-        type: "button",
         class: "quiet",
         title: `Save ${title} as CSV`,
         onclick: () => this.saveCsv(),
@@ -47,7 +46,6 @@ export class Plot {
     this.png = h(
       "button",
       {
-        type: "button",
         class: "quiet",
         title: `Save ${title} as PNG`,
         onclick: () => this.savePng(),
@@ -280,7 +278,6 @@ export function legend(names, hidden, toggle) {
         h(
           "button",
           {
-            type: "button",
             "aria-pressed": String(!hidden.has(k)),
             title: `Show or hide ${name}`,
             onclick: () => toggle(k),

@@ -34,21 +34,21 @@ export class TablePanel {
     );
     this.frames = h(
       "button",
-      { type: "button", "aria-pressed": "false", onclick: () => this.showFrames() },
+      { "aria-pressed": "false", onclick: () => this.showFrames() },
       "Frames",
     );
     this.build = h(
       "button",
-      { type: "button", onclick: () => this.animate(this.table.rows.map((_, i) => i)) },
+      { onclick: () => this.animate(this.table.rows.map((_, i) => i)) },
       "Animate",
     );
     this.body = h("tbody");
     this.head = h("tr");
-    this.undo = h("button", { type: "button", onclick: request("table.undo") }, "Undo");
-    this.redo = h("button", { type: "button", onclick: request("table.redo") }, "Redo");
-    this.reset = h("button", { type: "button", onclick: request("table.reset") }, "Reset");
+    this.undo = h("button", { onclick: request("table.undo") }, "Undo");
+    this.redo = h("button", { onclick: request("table.redo") }, "Redo");
+    this.reset = h("button", { onclick: request("table.reset") }, "Reset");
     const file = (format) =>
-      h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
+      h("button", { onclick: () => this.download(format) }, format.toUpperCase());
     this.free = h("input", {
       type: "text",
       class: "number",
@@ -56,8 +56,8 @@ export class TablePanel {
       "aria-label": "Joints that move",
       onkeydown: (event) => event.key === "Enter" && this.lock(),
     });
-    this.locks = h("button", { type: "button", onclick: () => this.lock() }, "Lock the others");
-    this.frees = h("button", { type: "button", onclick: request("table.free") }, "Free all joints");
+    this.locks = h("button", { onclick: () => this.lock() }, "Lock the others");
+    this.frees = h("button", { onclick: request("table.free") }, "Free all joints");
     this.locking = h(
       "div",
       { class: "line", hidden: true, title: "The others are locked at zero: an arm of its own" },
@@ -244,7 +244,6 @@ export class TablePanel {
         h(
           "button",
           {
-            type: "button",
             class: "quiet",
             title: `${row.joint}: its four transforms`,
             "aria-label": `row ${i + 1}, ${row.joint}: show its four transforms`,

@@ -17,7 +17,6 @@ export class TaskPanel {
     this.reset = h(
       "button",
       {
-        type: "button",
         title: "Forget which goals were reached",
         onclick: () => lab.ask("task.reset"),
       },
@@ -117,7 +116,7 @@ export class TaskPanel {
         { class: "buttons" },
         h(
           "button",
-          { type: "button", onclick: () => this.lab.openPanel(panel) },
+          { onclick: () => this.lab.openPanel(panel) },
           `Open panel ${this.lab.panelTitle(panel)}`,
         ),
       );
@@ -165,12 +164,7 @@ export class TaskPanel {
       if (answer) input.setAttribute("aria-invalid", String(!answer.right));
     };
     input.addEventListener("keydown", (event) => event.key === "Enter" && send());
-    return h(
-      "span",
-      { class: "line" },
-      input,
-      h("button", { type: "button", onclick: send }, "Check"),
-    );
+    return h("span", { class: "line" }, input, h("button", { onclick: send }, "Check"));
   }
 
   mark({ goals }, { count, marks }) {

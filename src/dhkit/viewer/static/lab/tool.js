@@ -70,12 +70,12 @@ export class ToolPanel {
     this.note = h("p", { class: "note", role: "status" });
     this.grab = h(
       "button",
-      { type: "button", "aria-pressed": "false", onclick: () => this.toggle() },
+      { "aria-pressed": "false", onclick: () => this.toggle() },
       "Move the tool by a target",
     );
     this.clear = h(
       "button",
-      { type: "button", hidden: true, onclick: () => lab.ask("tool.clear") },
+      { hidden: true, onclick: () => lab.ask("tool.clear") },
       "Remove the target",
     );
     this.branches = h("div", { class: "branches", role: "group", "aria-label": "Branches" });
@@ -115,11 +115,7 @@ export class ToolPanel {
       const turning = axis > 2;
       const name = `${sign > 0 ? "+" : "\u2212"}${turning ? "r" : ""}${AXES[axis % 3]}`;
       const label = `${turning ? "turn about" : "move along"} ${sign > 0 ? "plus" : "minus"} ${AXES[axis % 3]}`;
-      return h(
-        "button",
-        { type: "button", "aria-label": label, onclick: () => this.jogged(axis, sign) },
-        name,
-      );
+      return h("button", { "aria-label": label, onclick: () => this.jogged(axis, sign) }, name);
     };
     const rows = [0, 3].map((first) =>
       h(
@@ -292,7 +288,7 @@ export class ToolPanel {
     const choose = () => this.lab.ask("tool.choose", { branch: branch.name });
     const button = h(
       "button",
-      { type: "button", "aria-pressed": String(branch.chosen), title: values, onclick: choose },
+      { "aria-pressed": String(branch.chosen), title: values, onclick: choose },
       h(
         "span",
         {},

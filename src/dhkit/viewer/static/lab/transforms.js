@@ -14,15 +14,10 @@ export class TransformsPanel {
     this.lab = lab;
     this.steps = FIRST.map((step) => ({ ...step }));
     this.list = h("ol", { class: "steps" });
-    this.apply = h(
-      "button",
-      { type: "button", class: "main", onclick: () => this.run() },
-      "Apply step by step",
-    );
+    this.apply = h("button", { class: "main", onclick: () => this.run() }, "Apply step by step");
     this.add = h(
       "button",
       {
-        type: "button",
         onclick: () =>
           this.change(() =>
             this.steps.push({ kind: "turn", axis: "x", amount: "90°", about: "current" }),
@@ -193,7 +188,6 @@ export class TransformsPanel {
             h(
               "button",
               {
-                type: "button",
                 class: "quiet",
                 "aria-label": `Remove step ${k + 1}`,
                 onclick: () => this.change(() => this.steps.splice(k, 1)),

@@ -22,7 +22,7 @@ export class WorkspacePanel extends FollowingPanel {
     );
     this.again = h(
       "button",
-      { type: "button", onclick: () => lab.ask("workspace.show", { kind: this.kind.value }) },
+      { onclick: () => lab.ask("workspace.show", { kind: this.kind.value }) },
       "Draw again",
     );
     this.note = h("p", { class: "note", role: "status" });

@@ -18,7 +18,7 @@ export class RecordedPanel {
       ...motions.map((motion, index) =>
         h(
           "button",
-          { type: "button", "aria-pressed": "false", onclick: () => this.play(index) },
+          { "aria-pressed": "false", onclick: () => this.play(index) },
           h("span", {}, motion.name),
           h("small", {}, `${fixed(motion.duration, 2)} s`),
         ),
