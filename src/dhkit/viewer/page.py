@@ -97,9 +97,10 @@ _OFFLINE_MODULES = (
 """Modules of a page with panels and without Python."""
 
 _IMPORT = re.compile(r'(\bfrom |\bimport\()"(\.\.?/[^"]+)"')
-_UNQUOTED = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
+_UNQUOTED = string.punctuation.translate({ord(mark): None for mark in "%#"}) + " "
 """Characters that a ``data:`` address has unquoted: base64 would be a quarter longer."""
-_INDENTATION = re.compile(r"^[ \t]+", re.MULTILINE)
+_INDENTATION = re.compile(r"(?<=[{};,])\n\s*|^[ \t]+", re.MULTILINE)
+"""Line ends after braces, semicolons and commas of a style sheet, and indentation; none of them stands in a string."""
 _REMOVED = re.compile(r"""^[ \t]*(?://.*)?\n?|[ \t]+// [^"'`\n]*$""", re.MULTILINE)
 """Indentation, empty lines and comments, which offline modules lack; no string has several lines, and what looks like a
 comment in a string is followed by a quotation mark."""
