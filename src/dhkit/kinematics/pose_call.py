@@ -30,6 +30,8 @@ class PoseCall:
             "complete": True,
         }
         B = len(solver.fit.branches)
+        # Distance, valid, flags and status.
+        self._pose_bytes = 8 + 2 * B + 1
         # The ordinary way corrects the kernel's distance of poses beyond reach.
         self._needs_reach = has_offset_wrist(solver.fit)
         middle = np.arange(1.0, description.n + 1.0) / description.n
@@ -73,9 +75,8 @@ class PoseCall:
         q, packed = found
         solutions = IKSolutions.of_packed(q, packed, self._shared)
         if self._needs_reach:
-            is_single = q.ndim == 2
-            is_reached = packed.startswith(_ZERO) if is_single else not solutions.distance.any()
-            if not is_reached:
+            places = range(0, len(packed), self._pose_bytes)
+            if not all(packed.startswith(_ZERO, place) for place in places):
                 return None
         return solutions
 
