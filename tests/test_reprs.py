@@ -44,9 +44,11 @@ from dhkit.dynamics import (
 from dhkit.execution.isolation import Kind
 from dhkit.expressions import Atom, Budget, Expression, parse
 from dhkit.kernels import Kernel, SingleCall
+from dhkit.kinematics.descent_program import descent_program
 from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
 from dhkit.planning.certificate.checker import Check
+from dhkit.symbolic import Loop
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics
 from dhkit.trajectories.pieces import Pieces
@@ -384,6 +386,7 @@ VALUES = {
     Budget: Budget,
     Expression: long_sum,
     Kernel: lambda: kinematic_kernels(planar().description)[0],
+    Loop: lambda: descent_program(planar().description, 3),
     SingleCall: lambda: planar()._calls.fk,
     ForwardDynamicsDerivatives: lambda: planar().forward_dynamics_derivatives(
         [0, 0], [0, 0], [0, 0]

@@ -1679,8 +1679,8 @@ class Arm:
         --------
         >>> found = Arm.load("planar2r").forward_dynamics_derivatives([0, 0], [0, 0], [0, 0])
         >>> found.dqdd_dtau.round(3)
-        array([[  3.842, -11.046],
-               [-11.046,  44.256]])
+        array([[  3.84, -11.04],
+               [-11.04,  44.24]])
         """
         if threads is _ONE_THREAD:
             found = self._calls.forward_dynamics_derivatives(q, qd, tau, out)

@@ -148,8 +148,8 @@ def forward_dynamics_derivatives(
     >>> arm = library_robot("planar2r")
     >>> found = forward_dynamics_derivatives(arm, [0.0, 0.0], [0.0, 0.0], [0.0, 0.0])
     >>> found.dqdd_dtau.round(3)
-    array([[  3.842, -11.046],
-           [-11.046,  44.256]])
+    array([[  3.84, -11.04],
+           [-11.04,  44.24]])
     """
     states = {"q": q, "qd": qd, "tau": tau}
     tail = (3, description.n, description.n)

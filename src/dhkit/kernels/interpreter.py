@@ -89,7 +89,7 @@ class LoopInterpreter:
 
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
-        self._start = Interpreter(loop.start, [FLOAT, FLOAT])
+        self._start = Interpreter(loop.begin, [FLOAT, FLOAT])
         self._step = Interpreter(loop.step, [FLOAT, FLOAT])
         self._finish = Interpreter(loop.finish, [FLOAT] * len(loop.outputs))
 
@@ -98,7 +98,7 @@ class LoopInterpreter:
     ) -> None:
         """Fill ``outputs``; all are arrays (N, size), as for :class:`dhkit.kernels.Kernel`."""
         count = len(inputs[0])
-        state, fixed = (np.empty((count, output.size)) for output in self._loop.start.outputs)
+        state, fixed = (np.empty((count, output.size)) for output in self._loop.begin.outputs)
         self._start(parameters, inputs, [state, fixed])
         active = np.arange(count)
         for _ in range(self._loop.most):

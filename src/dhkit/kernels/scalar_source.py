@@ -111,7 +111,7 @@ def _input_names(program: Graph | Loop) -> list[str]:
 def _loop_values(loop: Loop, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[list[Vector]]:
     """Write a loop into ``body`` and return the entries of its outputs."""
     # Where an input is not finite, the start is NaN, and all that follows from it.
-    first, fixed = result_values(loop.start, body, inputs, [FLOAT, FLOAT])
+    first, fixed = result_values(loop.begin, body, inputs, [FLOAT, FLOAT])
     body.lines += ["  br label %before", "before:", "  br label %step", "step:"]
 
     # The state's values and the number of steps come from the start, and then from the step before, whose values are

@@ -16,7 +16,7 @@ class Loop:
 
     Attributes
     ----------
-    start
+    begin
         Inputs ``parameters`` and those of the program; outputs ``state`` and ``fixed``.
     step
         Inputs ``parameters``, those of the program, ``fixed`` and ``state``; outputs the next ``state``, and
@@ -27,17 +27,17 @@ class Loop:
         Largest number of steps.
     """
 
-    start: Graph
+    begin: Graph
     step: Graph
     finish: Graph
     most: int
 
     def __post_init__(self) -> None:
-        state, fixed = (variable.size for variable in self.start.outputs)
+        state, fixed = (variable.size for variable in self.begin.outputs)
         for graph in (self.step, self.finish):
-            own, shared = graph.inputs[:-2], self.start.inputs
+            own, shared = graph.inputs[:-2], self.begin.inputs
             if own != shared or [x.size for x in graph.inputs[-2:]] != [fixed, state]:
-                raise ValueError(f"{graph.name}: inputs differ from those of {self.start.name}")
+                raise ValueError(f"{graph.name}: inputs differ from those of {self.begin.name}")
         if [variable.size for variable in self.step.outputs] != [state, 1]:
             raise ValueError(f"{self.step.name}: outputs are not a state and whether it goes on")
 
@@ -49,7 +49,7 @@ class Loop:
     @property
     def inputs(self) -> tuple[Variable, ...]:
         """The parameters, and the inputs of an item."""
-        return self.start.inputs
+        return self.begin.inputs
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
