@@ -19,7 +19,7 @@ import pytest
 from hypothesis import given, settings
 
 import acceptance
-from acceptance import DIFFERENT_ROBOTS, only_accepting
+from acceptance import DIFFERENT_ROBOTS, only_accepting, slow_if
 from dhkit import Arm, dynamics, kinematics
 from dhkit.kernels import single_calls
 from dhkit.kernels.call_source import MAX_ITEMS
@@ -88,7 +88,9 @@ def is_builtin(function):
     return isinstance(function, types.BuiltinFunctionType)
 
 
-@pytest.mark.parametrize("name", DIFFERENT_ROBOTS)
+@pytest.mark.parametrize(
+    "name", [slow_if(name in ("panda", "stanford"), name) for name in DIFFERENT_ROBOTS]
+)
 def test_values_are_those_of_the_ordinary_way(name, law):
     arm = compiled_robot(name)
     rng = np.random.default_rng(0)
@@ -273,7 +275,10 @@ def test_a_result_may_lie_where_an_input_lies(puma):
                     assert np.allclose(out, expected, rtol=1e-9, atol=1e-9), (method, shift)
 
 
-@pytest.mark.parametrize("name", ["planar2r", "puma560", "stanford", "panda"])
+@pytest.mark.parametrize(
+    "name",
+    [slow_if(name != "planar2r", name) for name in ("planar2r", "puma560", "stanford", "panda")],
+)
 def test_a_state_gets_the_same_bits_alone_and_in_a_compiled_batch(name):
     arm = compiled_robot(name)
     for kernel in [*kinematic_kernels(arm.description), *dynamics.dynamic_kernels(arm)]:
@@ -467,7 +472,9 @@ def poses(arm, rng, count):
             yield wrong
 
 
-@pytest.mark.parametrize("name", CLOSED_FORMS)
+@pytest.mark.parametrize(
+    "name", [slow_if(name in ("ur5", "irb140"), name) for name in CLOSED_FORMS]
+)
 def test_the_solutions_of_one_pose_are_those_of_the_ordinary_way(name, law):
     arm = compiled_robot(name)
     rng = np.random.default_rng(7)
@@ -492,7 +499,9 @@ def test_the_solutions_of_one_pose_are_those_of_the_ordinary_way(name, law):
     assert taken > 20
 
 
-@pytest.mark.parametrize("name", CLOSED_FORMS)
+@pytest.mark.parametrize(
+    "name", [slow_if(name in ("ur5", "irb140"), name) for name in CLOSED_FORMS]
+)
 def test_the_solutions_of_few_poses_are_those_of_each(name):
     arm = compiled_robot(name)
     T = arm.fk(np.random.default_rng(9).uniform(-1, 1, (7, arm.n)))
@@ -722,6 +731,7 @@ def test_far_poses_and_huge_shapes_are_told_as_before(puma):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=acceptance.sample_size(100, quick=4))
 @given(arms(least=6))
 def test_searches_of_random_arms_are_compiled(description):
