@@ -85,10 +85,10 @@ class _Layout:
         """The row of each entry of each output."""
         first = sum(map(len, self.inputs))
         rows: dict[tuple[int, int], int] = {}
-        return [
-            [rows.setdefault((k, place), first + len(rows)) for place in places]
-            for k, places in enumerate(self.graph.results)
-        ]
+        outputs = []
+        for k, places in enumerate(self.graph.results):
+            outputs.append([rows.setdefault((k, place), first + len(rows)) for place in places])
+        return outputs
 
     @property
     def block(self) -> int:
@@ -175,7 +175,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
 
 def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) -> list[str]:
     """Write the program's operations into ``body`` and return the lines that store its results."""
-    states = [[_loaded(body, row, layout.block) for row in rows] for rows in layout.inputs]
+    states = [_loaded(body, rows, layout.block) for rows in layout.inputs]
     parameters = [Vector(body, f"%p{k}") for k in range(graph.inputs[0].size)]
     results: dict[int, Vector] = {}
     outputs = result_values(graph, body, [parameters, *states], types)
@@ -214,10 +214,10 @@ def result_values(
         missing = x - x if missing is None else missing + (x - x)
     if missing is None:
         return outputs
-    return [
-        [entry + missing for entry in entries] if kind == FLOAT else entries
-        for kind, entries in zip(types, outputs, strict=True)
-    ]
+    for k, kind in enumerate(types):
+        if kind == FLOAT:
+            outputs[k] = [entry + missing for entry in outputs[k]]
+    return outputs
 
 
 def plain_results(
@@ -225,7 +225,7 @@ def plain_results(
 ) -> list[list[Vector]]:
     """Write a program's operations into ``body``, as :func:`result_values`, without its rule for NaN."""
     values = _node_values(graph, body, inputs)
-    return [[_number(values[place]) for place in places] for places in graph.results]
+    return [_numbers(values, places) for places in graph.results]
 
 
 def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[_Value]:
@@ -312,6 +312,10 @@ def _number(value: _Value) -> Vector:
     )
 
 
+def _numbers(values: Sequence[_Value], places: Sequence[int]) -> list[Vector]:
+    return [_number(values[place]) for place in places]
+
+
 def _mask(value: _Value) -> Mask:
     """Return a value as truth values: numbers other than 0 are true."""
     return value if isinstance(value, Mask) else value.differs(0.0)
@@ -339,9 +343,14 @@ def _address(body: Body, row: int, block: int) -> str:
     return body.define(f"getelementptr double, ptr {start}, i64 %item")
 
 
-def _loaded(body: Body, row: int, block: int) -> Vector:
-    address = _address(body, row, block)
-    return Vector(body, body.define(f"load {body.number_type}, ptr {address}, align 64"))
+def _loaded(body: Body, rows: Sequence[int], block: int) -> list[Vector]:
+    """Return the current vectors of rows."""
+    values = []
+    for row in rows:
+        address = _address(body, row, block)
+        load = f"load {body.number_type}, ptr {address}, align 64"
+        values.append(Vector(body, body.define(load)))
+    return values
 
 
 def _copied(

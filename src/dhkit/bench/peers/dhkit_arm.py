@@ -157,7 +157,7 @@ def _few(size: int, quantity: str) -> Callable[[Workload], Task]:
         # The last block is filled with the first states.
         count = -(-len(inputs[0]) // size)
         filled = [np.resize(x, (count * size, *x.shape[1:])) for x in inputs]
-        blocks = [tuple(x[k * size : (k + 1) * size] for x in filled) for k in range(count)]
+        blocks = list(zip(*(np.split(x, count) for x in filled), strict=True))
 
         def prepare(items: int) -> Call:
             return one_by_one(function, blocks)(-(-items // size))
