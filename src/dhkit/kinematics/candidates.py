@@ -106,15 +106,6 @@ def orthonormal(T: Array) -> Array:
     return T
 
 
-def wrap_angles(q: Array, turning: NDArray[np.bool_]) -> Array:
-    """Return joint values q (..., n), rad and m, with angles of the marked joints (n,) reduced to (-pi, pi]."""
-    # q - 2 pi k with k = ceil((q - pi) / (2 pi)) is in (-pi, pi]. Angles that are there already stay as they are: the
-    # quotient of one just above -pi would be rounded to -1.
-    inside = (q > -np.pi) & (q <= np.pi)
-    whole_turns = math.tau * np.ceil((q - np.pi) / math.tau)
-    return np.where(turning & ~inside, q - whole_turns, q)
-
-
 def is_beyond_all_links(description: Description, positions: Array) -> NDArray[np.bool_]:
     """Return whether positions (..., 3), m, are farther from axis 1 than all links in one line reach, shape (...).
 

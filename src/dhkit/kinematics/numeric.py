@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.kernels import SMALL_BATCH, check_whole, in_threads, pose_rows, uncounted
-from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrap_angles
+from dhkit.kinematics.candidates import are_poses, collect
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.newton import Newton, closes
@@ -125,7 +125,7 @@ def solve_numerically(
     distance = np.full(posed.size, np.nan)
     search = NumericSearch(newton, tolerance, restarts, seed)
     rows = np.flatnonzero(posed)
-    goals = orthonormal(poses[posed]).reshape(-1, 16)
+    goals = poses[posed].reshape(-1, 16)
 
     # Not counted for a few poses, so that their many starts do not start a compilation in a control loop.
     few = uncounted if posed.size < SMALL_BATCH else nullcontext
@@ -140,10 +140,9 @@ def solve_numerically(
     for done in in_threads(solve, _chunks(len(rows), chunk), threads):
         if progress is not None:
             progress(done, posed.size)
-    is_unlimited = ~description.numbers.prismatic & np.isinf(newton.upper)
     return collect(
         description,
-        wrap_angles(q, is_unlimited).reshape(*batch, 1, n),
+        q.reshape(*batch, 1, n),
         distance.reshape(batch),
         positions=poses[..., :3, 3],
         posed=posed,
@@ -277,7 +276,7 @@ def refined(description: Description, q: Array, goals: Array) -> tuple[Array, ND
     # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
     with np.errstate(all="ignore"), uncounted():
         q, error = newton.descend(goals, q, _REFINED)
-    return wrap_angles(q, ~description.numbers.prismatic), closes(error, _REFINED_CLOSES)
+    return q, closes(error, _REFINED_CLOSES)
 
 
 def _first_starts(newton: Newton, q0: ArrayLike | None, batch: tuple[int, ...]) -> Array:
