@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 import importlib
+import re
 import sys
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Union, get_args, get_origin
 
 import numpy as np
+from docutils import nodes
 from numpy.typing import ArrayLike
 from sphinx import addnodes
+from sphinx.ext import autosummary
 from sphinx.ext.napoleon.docstring import NumpyDocstring
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util import inspect as sphinx_inspect, typing as sphinx_typing
@@ -83,7 +86,8 @@ html_theme_options = {
     "dark_css_variables": {"color-brand-primary": "#8fb6ff", "color-brand-content": "#8fb6ff"},
     "navigation_with_keys": True,
 }
-pygments_style = "friendly"
+# Of the light styles, one whose comments and outputs have a contrast of 4.5 or more.
+pygments_style = "default"
 pygments_dark_style = "github-dark"
 
 
@@ -105,6 +109,9 @@ NumpyDocstring._parse_attributes_section = lambda self, section: self._format_fi
 NumpyDocstring._parse_attribute_docstring = lambda self: NumpyDocstring(
     self._dedent(self._consume_to_end()), self._config, self._app, "method"
 ).lines()
+
+# A sentence ends at a period after a word and before a capital: not at "A_1 ... A_n", nor at the dot of a product.
+autosummary.periods_re = re.compile(r"(?<=[^\s.])\.\s+(?=[A-Z`*(:])")
 
 
 def homes() -> dict[str, str]:
@@ -151,6 +158,47 @@ class FullNames(SphinxPostTransform):
                     node["reftarget"] = full
                 # An ambiguous short name is not looked up in every class: Sphinx does so where this key exists.
                 node.attributes.pop("refspecific", None)
+
+
+NUMBER = re.compile(r"-?\d[\d.,]*(e[-+]?\d+)?( (%|s|ms|µs|ns))?")
+"""The text of a cell that holds a number, with or without its unit."""
+
+
+class NumbersAtTheRight(SphinxPostTransform):
+    """Mark the cells of a table's columns of numbers, which the style sheet aligns and does not divide."""
+
+    default_priority = 6
+
+    def run(self, **kwargs) -> None:
+        """Look at each column of each table; cells that span others have no columns."""
+        for table in self.document.findall(nodes.table):
+            rows = [list(row.findall(nodes.entry)) for row in table.findall(nodes.row)]
+            if len({len(row) for row in rows}) != 1:
+                continue
+            for column in zip(*rows, strict=True):
+                bodies = [cell for cell in column if isinstance(cell.parent.parent, nodes.tbody)]
+                filled = [text for cell in bodies if (text := cell.astext().strip())]
+                numbers = [text for text in filled if NUMBER.fullmatch(text)]
+                words = [text for text in filled if text.isalpha()]
+                if numbers and len(numbers) + len(words) == len(filled):
+                    for cell in column:
+                        cell["classes"].append("number")
+
+
+LONGEST_WORD = 36
+"""Longest word of inline code that fits on a line of a telephone, characters."""
+
+
+class LongWords(SphinxPostTransform):
+    """Mark inline code that has a word too long for a narrow screen: the style sheet divides no other."""
+
+    default_priority = 7
+
+    def run(self, **kwargs) -> None:
+        """Look at every piece of inline code."""
+        for literal in self.document.findall(nodes.literal):
+            if max(map(len, literal.astext().split()), default=0) > LONGEST_WORD:
+                literal["classes"].append("long")
 
 
 def full_name(env, node, target: str, objects) -> str | None:
@@ -245,6 +293,8 @@ _VALUE_TEXT = sphinx_inspect.object_description
 
 def type_text(annotation, mode="fully-qualified-except-typing", **options) -> str:
     """Return a type as the sources write it: the alias, instead of what it stands for."""
+    if isinstance(annotation, str) and annotation.startswith("Annotated["):
+        return without_metadata(annotation)
     members = list(get_args(annotation))
     origin = get_origin(annotation)
     if origin is Annotated:
@@ -264,12 +314,31 @@ def type_text(annotation, mode="fully-qualified-except-typing", **options) -> st
     return _TYPE_TEXT(annotation, mode, **options)
 
 
+def without_metadata(annotation: str) -> str:
+    """Return the type of an ``Annotated[type, ...]`` that is given as text."""
+    tree = ast.parse(annotation, mode="eval").body
+    return ast.unparse(tree.slice.elts[0])
+
+
 def value_text(value, **options) -> str:
     """Return a default as it is written: that of a field of pydantic is what its factory makes."""
     factory = getattr(value, "default_factory", None)
     if type(value).__name__ == "FieldInfo" and factory is not None:
         value = factory()
     return _VALUE_TEXT(value, **options)
+
+
+def default_text(value, **options) -> str:
+    """Return the default of a parameter; an ellipsis, as in stubs, for an object that does not print as Python.
+
+    Sphinx divides a signature that is not Python at its commas, those inside types and values included.
+    """
+    text = value_text(value, **options)
+    try:
+        ast.parse(text, mode="eval")
+    except SyntaxError:
+        return "..."
+    return text
 
 
 def replace_in_sphinx(old, new) -> None:
@@ -285,9 +354,13 @@ def setup(app):
     """Register the resolution of names."""
     replace_in_sphinx(_TYPE_TEXT, type_text)
     replace_in_sphinx(_VALUE_TEXT, value_text)
+    # The name that signatures are written with; values of attributes are shown as they print.
+    sphinx_inspect.object_description = default_text
     app.connect("source-read", with_own_pages)
     app.connect("include-read", with_own_links)
     app.connect("env-check-consistency", prepare)
     app.connect("missing-reference", without_page)
     app.add_post_transform(FullNames)
+    app.add_post_transform(NumbersAtTheRight)
+    app.add_post_transform(LongWords)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

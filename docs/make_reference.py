@@ -9,7 +9,8 @@ import re
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from types import GenericAlias, ModuleType
+from types import GenericAlias, ModuleType, UnionType
+from typing import Any, get_origin
 
 import dhkit
 from dhkit import Arm
@@ -37,6 +38,8 @@ PACKAGES = {
 """Packages that users import, with the titles of their pages, in the order of the table of contents."""
 LONG_TYPE = re.compile(r"numpy\.ndarray\[.*numpy\.dtype\[numpy\.(\w+)\]\]")
 """An array type of NumPy as it prints; the group is the type of its entries."""
+MODULE_PATH = re.compile(r"\b(?:[a-z_]\w*\.)+(?=[A-Z])")
+"""Modules before the name of a class in a type that prints."""
 LONGEST_VALUE = 120
 """Longest constant that a page prints, characters."""
 ARM_SECTIONS = {
@@ -184,6 +187,8 @@ def data_entry(module: ModuleType, name: str) -> str:
     """Return the entry of a constant or of an alias of a type."""
     value = getattr(module, name)
     shown = LONG_TYPE.sub(r"NDArray[\1]", " ".join(repr(value).split()))
+    if isinstance(value, UnionType) or get_origin(value) is not None or value is Any:
+        shown = MODULE_PATH.sub("", shown)
     text = f"``{shown}``" if len(shown) <= LONGEST_VALUE and " object at 0x" not in shown else ""
     documented = documented_constant(module, name)
     body = " ".join(documented.split()) or text or f"A {type(value).__name__}."
@@ -240,7 +245,7 @@ def home_places() -> dict[tuple[str, str], str]:
 
 def kind_of(value: object) -> str:
     """Return "class", "function" or "data"."""
-    if inspect.isclass(value) and not isinstance(value, GenericAlias):
+    if inspect.isclass(value) and not isinstance(value, GenericAlias) and value is not Any:
         return "class"
     return "function" if inspect.isroutine(inspect.unwrap(value)) else "data"  # type: ignore[arg-type]
 

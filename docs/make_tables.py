@@ -61,6 +61,10 @@ ACCURACY = {
 """Quantities of laws that the page on accuracy lists, by the folder of their tests."""
 
 
+SETTING = re.compile(r'\b\w+="\w+"')
+"""An argument with its value, as a contender's name states it."""
+
+
 def read(name: str) -> dict[str, Any]:
     """Return a results file."""
     found: dict[str, Any] = json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
@@ -73,6 +77,21 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     lines = ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
     lines += ["| " + " | ".join(row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def rounded(value: float, digits: int = 0) -> str:
+    """Return an error with a power of ten, after so many digits; 0 is 0."""
+    return f"{value:.{digits}e}" if value else "0"
+
+
+def ratio_text(ratio: float) -> str:
+    """Return a ratio with two digits and without a power of ten."""
+    return f"{ratio:.2g}" if ratio < 99.5 else f"{float(f'{ratio:.2g}'):,.0f}"
+
+
+def contender(row: dict[str, Any]) -> str:
+    """Return the name of a contender, with settings as code."""
+    return SETTING.sub(r"`\g<0>`", row["contender"])
 
 
 def machine(found: dict[str, Any]) -> str:
@@ -91,12 +110,13 @@ def speed_rows(found: dict[str, Any], mode: str) -> Iterator[list[str]]:
         for k, row in enumerate(sorted(rows, key=lambda row: row["seconds"])):
             is_fastest = row["seconds"] == min(other["seconds"] for other in rows)
             time = duration(row["seconds"])
-            ratio = "" if own is None else f"{row['seconds'] / own:.2g}"
-            agrees = f"{row['error']:.0e}" if row["agrees"] else f"**{row['error']:.0e}**"
+            ratio = "" if own is None else ratio_text(row["seconds"] / own)
+            error = rounded(row["error"])
+            agrees = error if row["agrees"] else f"**{error}**"
             solutions = "" if row["solutions"] is None else f"{row['solutions']:.2f}"
             yield [
                 name if k == 0 else "",
-                row["contender"],
+                contender(row),
                 f"**{time}**" if is_fastest else time,
                 ratio,
                 solutions,
@@ -125,9 +145,9 @@ def planning_table() -> str:
     rows = [
         [
             f"{row['speed']:g}",
-            row["contender"],
+            contender(row),
             f"{100 * (row['mean'] - 1):.2f} %",
-            f"{row['excess']:.0e}",
+            rounded(row["excess"]),
             duration(row["seconds"]),
         ]
         for row in read("planning")["rows"]
@@ -141,18 +161,18 @@ def simulation_table() -> str:
     rows = [
         [
             row["problem"],
-            row["contender"],
+            contender(row),
             duration(row["timing"]["seconds"]),
-            f"{row['joint_error']:.0e}" if row["joint_error"] else "reference",
+            rounded(row["joint_error"]) if row["joint_error"] else "reference",
         ]
         for row in read("control")["integration"]
     ]
     batches = [
         [
-            f"{row['arms']} arms, 1 s of computed torque",
-            row["contender"],
-            f"{duration(row['each']['seconds'])} a step and arm",
-            "" if row["difference"] is None else f"{row['difference']:.0e}",
+            f"{row['arms']:,} arms, 1 s of computed torque: time a step and arm",
+            contender(row),
+            duration(row["each"]["seconds"]),
+            "" if row["difference"] is None else rounded(row["difference"]),
         ]
         for row in read("control")["batch"]
     ]
@@ -199,7 +219,7 @@ def accuracy() -> str:
                     f"{folder}: {quantity}",
                     str(len(found)),
                     f"{max(law['samples'] for law in found):,}",
-                    f"{max(law['seen'] for law in found):.1e}",
+                    rounded(max(law["seen"] for law in found), 1),
                     f"{found[0]['required']:g}",
                 ]
             )
@@ -211,7 +231,7 @@ def library() -> str:
     rows = []
     for name in dhkit.robots():
         arm = Arm.load(name)
-        source = " ".join((arm.description.source or "").split())
+        source = " ".join((arm.description.source or "").split()).removesuffix(".")
         rows.append([f"`{name}`", arm.description.kinds, arm.description.convention.value, source])
     return table(("name", "joints", "table", "source"), rows)
 

@@ -199,7 +199,7 @@ def grade_answers(
 
 
 def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
-    """Return the robot that a sheet names: one of the library, or a file in the sheet's own folder.
+    r"""Return the robot that a sheet names: one of the library, or a file in the sheet's own folder.
 
     Parameters
     ----------
@@ -219,6 +219,15 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
         No robot, an unknown one, or a path that leaves the folder.
     DescriptionError
         The file describes no robot.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from dhkit.grading.answers.sheet import read_sheet
+    >>> lines = ["format = 1", 'robot = "planar2r"', "[answer]", 'V = "0"']
+    >>> size = Path("answer.toml").write_text("\n".join(lines))
+    >>> robot_of(read_sheet(Path("answer.toml")), ".").name
+    'planar2r'
     """
     name = sheet.robot
     place = f"{sheet.file}: robot"

@@ -217,6 +217,18 @@ def import_cad(
     ------
     ModelError
         A part that is missing, cannot be assigned or read, was moved on export, or whose unit is not clear: one line.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from trimesh.creation import box
+    >>> from dhkit.description import library_robot
+    >>> Path("parts").mkdir()
+    >>> size = Path("parts/link1.stl").write_bytes(box(bounds=[[0, -30, 0], [500, 30, 40]]).export(file_type="stl"))
+    >>> size = Path("parts/link2.stl").write_bytes(box(bounds=[[500, -30, 0], [900, 30, 40]]).export(file_type="stl"))
+    >>> imported = import_cad("parts", library_robot("planar2r"), unit="mm", q=[0, 0], density=2700)
+    >>> [round(float(joint.body.mass), 3) for joint in imported.description.joints]
+    [3.24, 2.592]
     """
     folder = Path(folder)
     description = description_of(description)

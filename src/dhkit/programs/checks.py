@@ -36,7 +36,7 @@ def check(
     samples: int = 200,
     progress: Callable[[str], None] = lambda text: None,
 ) -> CheckReport:
-    """Score a program.
+    r"""Score a program.
 
     Parameters
     ----------
@@ -64,6 +64,19 @@ def check(
         The program cannot be loaded.
     DhkitError
         The arm lacks something that the rubric needs, such as bodies for a controller.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from dhkit import Arm
+    >>> from dhkit.programs import Program
+    >>> lines = ["from math import cos, sin", "def fk(q):", "    x, y = 0.5 * cos(q[0]), 0.5 * sin(q[0])"]
+    >>> lines += ["    return [[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]]"]
+    >>> size = Path("mine.py").write_text("\n".join(lines))
+    >>> with Program(Path("mine.py")) as program:
+    ...     report = check(Arm.load("planar2r"), program, samples=5, seed=1)
+    >>> report.points, report.functions["fk"][0].text
+    (0.0, '0 of 5 poses agree')
     """
     arm = arm if isinstance(arm, Arm) else Arm(description_of(arm))
     if not 1 <= samples <= 100_000:
