@@ -750,8 +750,9 @@ class Arm:
         seed: ArrayLike | None = None,
         out: Array | None = None,
         threads: int = 1,
+        redundancy: ArrayLike | None = None,
     ) -> IKSolutions:
-        """Return all closed-form solutions of fk(q) = T.
+        """Return all solutions of fk(q) = T.
 
         See :func:`dhkit.kinematics.inverse_kinematics`.
 
@@ -761,11 +762,15 @@ class Arm:
             Poses of the tool in the world, shape (..., 4, 4), m.
         seed
             Joint values, shape (n,) or (..., n), rad and m, from which a joint takes its angle that is free at a
-            singularity; 0 unless given.
+            singularity, 0 unless given, and an arm of seven joints its redundancy.
         out
             Array that receives the joint values, shape (..., B, n), float64, C-contiguous. Only for closed forms.
         threads
             Number of threads that share a large batch. Only for closed forms.
+        redundancy
+            For arms of seven joints, which have infinitely many solutions: the joint value 7, or the arm angle, of
+            those that are returned, shape () or (...), rad; see :attr:`family`. Without it and without a seed, a value
+            is chosen that allows a solution inside the limits.
 
         Returns
         -------
@@ -776,9 +781,9 @@ class Arm:
         Raises
         ------
         ModelError
-            The arm has no closed form, and the package ssik is not installed or does not accept it.
+            The arm has no closed form, and prismatic joints or not six or seven.
         ValueError, TypeError
-            T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
+            T has not shape (..., 4, 4); ``seed``, ``out`` or ``redundancy`` does not fit.
 
         Examples
         --------
@@ -793,13 +798,14 @@ class Arm:
         """
         if (
             seed is None
+            and redundancy is None
             and threads is _ONE_THREAD
             and (found := self._calls.ik(T, out)) is not None
         ):
             return found
         from dhkit.kinematics import inverse_kinematics
 
-        return inverse_kinematics(self._description, T, seed, out, threads)
+        return inverse_kinematics(self._description, T, seed, out, threads, redundancy)
 
     def ik_chunks(
         self, T: ArrayLike, size: int = 16_384, seed: ArrayLike | None = None, threads: int = 1
@@ -938,7 +944,7 @@ class Arm:
         ValueError
             T has not shape (N, 4, 4), or q0 not (n,) or not finite.
         ModelError
-            The arm has no closed form, and ssik is not installed or does not accept it.
+            The arm has no closed form and fewer than six joints.
 
         Examples
         --------

@@ -1,7 +1,6 @@
 """`dhkit ik`: the same solutions as in Python, however the pose is given; bad input in one line."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -208,24 +207,30 @@ def test_an_arm_near_a_family_is_solved_from_its_neighbour(facts, ik, tmp_path):
             ("0", "0", "0.3"),
             "no solution found by iteration from an arm of the family, which does not prove",
         ),
-        (("9", "0", "0"), "out of reach: farther from axis 1 than all links in one line"),
+        (("9", "0", "0"), "out of reach: no joint values reach this pose"),
     ):
         status, out, _ = ik(file, "--xyz", *xyz)
         assert status == 1 and refusal in out
 
 
-def test_iteration_steps_in_where_ssik_is_missing(facts, ik, monkeypatch):
-    from dhkit.kinematics import external
+def test_an_arm_of_seven_joints_is_solved_at_a_redundancy(facts, ik):
+    status, said = facts("panda", "--like", "ready", "--redundancy", "0.5")
+    assert (status, said["method"], said["redundancy_rad"]) == (0, "closed form", 0.5)
+    assert len(said["branches"]) == 8
+    assert np.abs(joints(said)[:, 6] - 0.5).max() < 1e-12
+    status, out, _ = ik("panda", "--like", "ready", "--redundancy", "45", "--degrees")
+    assert status == 0 and "at joint 7 = 45 °" in out
+    status, out, _ = ik("panda", "--xyz", "3", "0", "0")
+    assert status == 1 and "no solution found: joint 7 = " in out
+    status, _, err = ik("puma560", "--like", "nominal", "--redundancy", "0.5")
+    assert status == 2 and "redundancy is given, but puma560 has 6 joints" in err
 
-    external._solver.cache_clear()
-    monkeypatch.setitem(sys.modules, "ssik", None)
-    status, said = facts("panda", "--like", "ready")
-    assert (status, said["method"]) == (0, "numeric")
-    assert "pip install -e '.[ik]'" in said["note"]
-    status, out, _ = ik("panda", "--like", "ready")
-    assert status == 0
-    assert "note: one solution by iteration: panda is 7R: no closed form known" in out
-    assert "1 solution found by iteration" in out
+
+def test_an_arm_without_closed_form_is_solved_by_elimination(facts, ik):
+    status, said = facts("jaco", "--like", "0.1 0.2 0.3 0.4 0.5 0.6")
+    assert (status, said["method"], len(said["branches"])) == (0, "elimination", 8)
+    status, out, _ = ik("jaco", "--like", "0.1 0.2 0.3 0.4 0.5 0.6")
+    assert status == 0 and "8 solutions found by elimination" in out
 
 
 @pytest.mark.parametrize(

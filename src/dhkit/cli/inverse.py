@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from dhkit.arm import Arm
-from dhkit.cli.arguments import OutsideLimits, option_values, target, with_long_options
+from dhkit.cli.arguments import OutsideLimits, numbers, option_values, target, with_long_options
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import Degrees, EulerAngles, EulerOrder, Json, Robot, read_arm
 from dhkit.cli.output import print_json, print_table, say
@@ -39,7 +39,7 @@ class Method(StrEnum):
 
     CLOSED_FORM = "closed form"
     NEIGHBOUR = "iteration from an arm of the family"
-    SSIK = "ssik"
+    ELIMINATION = "elimination"
     NUMERIC = "numeric"
 
 
@@ -92,6 +92,17 @@ class ReachedPose:
         return [text for flag, text in FLAG_DESCRIPTIONS.items() if self.solutions.flags[k] & flag]
 
     @property
+    def given(self) -> str:
+        """The redundancy of the solutions, such as ``joint 7 = 0.7854 rad``; empty for arms without."""
+        value = self.solutions.redundancy
+        if value is None:
+            return ""
+        redundant = classify(self.arm.description).redundant
+        name = "joint 7" if redundant is None else redundant[0].redundancy
+        shown = math.degrees(float(value)) if self.degrees else float(value)
+        return f"{name} = {_rounded(shown, 6):.6g} {'°' if self.degrees else 'rad'}"
+
+    @property
     def refusal(self) -> str:
         """Reason why no solution is shown; empty if one is."""
         if self.shown:
@@ -108,11 +119,13 @@ class ReachedPose:
                 else "misses the orientation"
             )
             return f"{verdict}: the best try {missing}"
+        if not is_proved and self.solutions.redundancy is not None:
+            return f"no solution found: {self.given}"
         if not is_proved:
             return f"no solution found by {self.method}, which does not prove that there is none"
-        if self.method is Method.CLOSED_FORM:
+        if np.isfinite(distance):
             return f"out of reach by {distance:.4g} m"
-        return "out of reach: farther from axis 1 than all links in one line"
+        return "out of reach: no joint values reach this pose"
 
 
 @app.command(
@@ -140,6 +153,12 @@ def ik(
         str | None,
         typer.Option(metavar="Q ...", help="Mark the branch nearest to these joint values."),
     ] = None,
+    redundancy: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ANGLE", help="Joint 7, or the arm angle, of an arm of seven joints, rad."
+        ),
+    ] = None,
     degrees: Degrees = False,
     limits: Annotated[
         bool, typer.Option("--limits", help="Print only branches inside the joint limits.")
@@ -158,7 +177,10 @@ def ik(
     near_q = (
         None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED)
     )
-    solutions, method, note = _solve(arm, T, near_q, limits=limits, numeric=numeric)
+    value = None if redundancy is None else float(numbers([redundancy], "--redundancy", [1])[0])
+    if value is not None and degrees:
+        value = math.radians(value)
+    solutions, method, note = _solve(arm, T, near_q, value, limits=limits, numeric=numeric)
     shown = solutions.allowed if limits else solutions.valid
     reached = ReachedPose(
         arm=arm,
@@ -180,13 +202,19 @@ def ik(
 
 
 def _solve(
-    arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: bool
+    arm: Arm,
+    T: Array,
+    near: Array | None,
+    redundancy: float | None,
+    *,
+    limits: bool,
+    numeric: bool,
 ) -> tuple[IKSolutions, Method, str]:
     """Return solutions, the method that found them, and the reason for an unexpected method."""
     note = ""
     if not numeric:
         try:
-            return arm.ik(T, seed=near), _method_of(arm), ""
+            return arm.ik(T, seed=near, redundancy=redundancy), _method_of(arm), ""
         except ModelError as error:
             note = f"one solution by iteration: {error}"
     solutions = arm.ik_numeric(T, near)
@@ -198,9 +226,9 @@ def _solve(
 def _method_of(arm: Arm) -> Method:
     """Return the method by which :meth:`dhkit.Arm.ik` solves an arm."""
     family = classify(arm.description)
-    if family.closed_form:
+    if family.closed_form or family.redundant is not None:
         return Method.CLOSED_FORM
-    return Method.SSIK if family.neighbour is None else Method.NEIGHBOUR
+    return Method.ELIMINATION if family.neighbour is None else Method.NEIGHBOUR
 
 
 def _with_whole_turns(solutions: IKSolutions, near: Array | None) -> Array:
@@ -282,6 +310,8 @@ def _summary(reached: ReachedPose) -> str:
         text = (
             f"{count} solution{'s' if count > 1 else ''} found by {by}, {inside} inside the limits"
         )
+    if reached.given:
+        text += f", at {reached.given}"
     return (
         text
         if nearest is None
@@ -311,6 +341,7 @@ def _facts(reached: ReachedPose) -> dict[str, Any]:
         "T": reached.T.tolist(),
         "xyz_m": xyz.tolist(),
         angle_key(f"euler_{reached.order}", degrees=reached.degrees): angles.tolist(),
+        "redundancy_rad": None if solutions.redundancy is None else float(solutions.redundancy),
         "met": list(solutions.met),
         "status": IKStatus(int(solutions.status_code)).name,
         "distance_m": float(solutions.distance),

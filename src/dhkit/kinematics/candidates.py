@@ -29,6 +29,8 @@ def collect(
     met: tuple[str, ...],
     flags: NDArray[np.uint8] | None = None,
     complete: bool = True,
+    none_exist: NDArray[np.bool_] | None = None,
+    redundancy: Array | None = None,
 ) -> IKSolutions:
     """Return joint positions as solutions.
 
@@ -50,6 +52,10 @@ def collect(
         Flags of the branches but for limits, shape (..., B); none unless given.
     complete
         Whether these are all solutions.
+    none_exist
+        Whether it is known that a pose has no solution, shape (...).
+    redundancy
+        See :class:`dhkit.kinematics.IKSolutions`.
     """
     valid = np.asarray(~np.isnan(q).any(axis=-1))
     found = valid.any(axis=-1)
@@ -59,9 +65,10 @@ def collect(
     singular = np.any(special & SINGULARITIES != 0, axis=-1)
 
     reached = np.where(singular, IKStatus.singular, IKStatus.ok)
-    missed = np.where(
-        is_beyond_all_links(description, positions), IKStatus.out_of_reach, IKStatus.not_found
-    )
+    beyond = is_beyond_all_links(description, positions)
+    if none_exist is not None:
+        beyond |= none_exist
+    missed = np.where(beyond, IKStatus.out_of_reach, IKStatus.not_found)
     status = np.where(found, reached, missed)
     status = np.where(posed, status, IKStatus.not_a_pose)
     return IKSolutions(
@@ -76,6 +83,7 @@ def collect(
         met=met,
         description=description,
         complete=complete,
+        redundancy=redundancy,
     )
 
 

@@ -12,7 +12,8 @@ from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.errors import ModelError
 from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.external import solve_externally
+from dhkit.kinematics.eliminated import solve_by_elimination
+from dhkit.kinematics.redundant import JOINTS, solve_redundant
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import free_angles, solve_in_closed_form, solver_of
 
@@ -29,13 +30,14 @@ def inverse_kinematics(
     seed: ArrayLike | None = None,
     out: Array | None = None,
     threads: int = 1,
+    redundancy: ArrayLike | None = None,
 ) -> IKSolutions:
     """Return all solutions of T_world_tool(q) = T in closed form.
 
     An arm whose axes are nearly those of a family, to 1e-3, is solved by Newton's method from the solutions of the
-    exact member of the family: see :mod:`dhkit.kinematics.neighbour`. Other arms of six or seven revolute joints
-    without a closed form of ours are handed to the package ssik, and iteration adds what it misses: see
-    :func:`dhkit.kinematics.external.solve_externally`.
+    exact member of the family: see :mod:`dhkit.kinematics.neighbour`. For other arms of six revolute joints all joints
+    but one are eliminated: see :func:`dhkit.kinematics.eliminated.solve_by_elimination`. Arms of seven revolute joints
+    have infinitely many solutions: those with a given joint 7 are returned.
 
     Parameters
     ----------
@@ -46,11 +48,14 @@ def inverse_kinematics(
     seed
         Joint positions, shape (n,) or (..., n), rad and m. Where two axes of the wrist coincide, one joint is free (q4,
         or q6 of an arm with three parallel axes), and where the point that joint 1 turns is on its axis, joint 1 is:
-        a free joint takes its angle from the seed, or 0. ssik does not use it.
+        a free joint takes its angle from the seed, or 0. An arm of seven joints takes joint 7 from it.
     out
         Array for the joint positions, shape (..., B, n), float64, contiguous. Only for closed forms.
     threads
         Number of threads for a large batch. Only for closed forms.
+    redundancy
+        Joint position 7 of an arm of seven joints, shape () or (...), rad. Without it and without a seed, values from
+        the middle of its limits outward are tried until one has a solution inside all limits.
 
     Returns
     -------
@@ -60,10 +65,10 @@ def inverse_kinematics(
     Raises
     ------
     ModelError
-        No closed form is known for this arm, and ssik does not accept it or is not installed; says how its axes lie
-        and what to use.
+        No closed form is known for this arm, and it has prismatic joints or not six or seven; says how its axes lie and
+        what to use.
     ValueError, TypeError
-        T has not shape (..., 4, 4); ``seed`` or ``out`` does not fit.
+        T has not shape (..., 4, 4); ``seed``, ``out`` or ``redundancy`` does not fit.
 
     Examples
     --------
@@ -79,8 +84,12 @@ def inverse_kinematics(
     check_whole("threads", threads, 1)
     poses = pose_rows(T)
     solver = solver_of(description)
+    if redundancy is not None and description.n != JOINTS:
+        raise ValueError(
+            f"redundancy is given, but {description.name} has {description.n} joints; expected 7"
+        )
     if solver is None:
-        return _solved_otherwise(description, poses, seed, out)
+        return _solved_otherwise(description, poses, seed, out, threads, redundancy)
     batch = poses.shape[:-2]
     free = free_angles(description, solver.fit, seed, batch)
     found = solve_in_closed_form(description, solver, poses, free, out, threads)
@@ -203,16 +212,23 @@ def inverse_kinematics_in_chunks(
 
 
 def _solved_otherwise(
-    description: Description, T: Array, seed: ArrayLike | None, out: Array | None
+    description: Description,
+    T: Array,
+    seed: ArrayLike | None,
+    out: Array | None,
+    threads: int,
+    redundancy: ArrayLike | None,
 ) -> IKSolutions:
-    """Return the solutions of an arm without a closed form: from those of its neighbour, or else by ssik."""
+    """Return the solutions of an arm without a closed form for six joints."""
+    found = classify(description)
     if out is not None:
-        words = classify(description).words
         raise ValueError(
-            f"out is given, but {description.name} is {words}: how many branches there will be is open"
+            f"out is given, but {description.name} is {found.words}: how many branches there will be is open"
         )
-    if classify(description).neighbour is not None:
+    if found.neighbour is not None:
         from dhkit.kinematics.neighbour import solve_from_neighbour  # with SciPy's rotations, 60 ms
 
         return solve_from_neighbour(description, T, seed)
-    return solve_externally(description, T)
+    if description.n == JOINTS:
+        return solve_redundant(description, T, seed, redundancy, threads)
+    return solve_by_elimination(description, T)

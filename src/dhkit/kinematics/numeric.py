@@ -33,6 +33,8 @@ _MIN_CANDIDATES = 512
 """Smallest number of random joint positions from which starts are chosen."""
 _REFINED = 1e-13
 """Error at which Newton's method stops refining a solution of another solver: share of the reach, and rad."""
+_FEW = 1_024
+"""Fewer solutions to refine are perhaps those of one pose."""
 _REFINED_CLOSES = 1e-10
 """Largest error of a refined solution: position as a share of the reach, rotation in rad."""
 
@@ -273,8 +275,9 @@ def refined(description: Description, q: Array, goals: Array) -> tuple[Array, ND
         Joint values (K, n), angles in (-pi, pi], and whether their pose is the goal to ``_REFINED_CLOSES``, shape (K,).
     """
     newton = Newton.of(description, position_only=False, limits=False)
-    # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
-    with np.errstate(all="ignore"), uncounted():
+    # Not counted for a few, so that many solutions of one pose do not start a compilation in a control loop.
+    few = uncounted if len(q) < _FEW else nullcontext
+    with np.errstate(all="ignore"), few():
         q, error = newton.descend(goals, q, _REFINED)
     return q, closes(error, _REFINED_CLOSES)
 

@@ -13,6 +13,7 @@ from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 from dhkit.kernels import pose_rows
+from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
@@ -110,8 +111,10 @@ def follow_path(
     Parameters
     ----------
     description
-        The robot. One without a closed form, of six joints or more, is followed by iteration, from each pose to the
-        next; a redundant one moves by the shortest joint steps, so that a closed path need not end where it began.
+        The robot. One of seven joints with a closed form at a given redundancy keeps that of ``q0``, so that a closed
+        path ends where it began. Where that leads nowhere, and for other arms of six joints or more without a closed
+        form, each pose is reached by iteration from the one before; a redundant arm then moves by the shortest joint
+        steps, and a closed path need not close.
     T
         Poses of the tool in the world, shape (N, 4, 4), near enough to each other for joints to move less than 45
         degrees (or an eighth of the reach) between them.
@@ -145,8 +148,21 @@ def follow_path(
     if poses.ndim != 3:
         raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
     q0 = joint_vector(description, q0, "q0")
+    if classify(description).redundant is not None:
+        kept = _followed_by_branches(description, poses, q0, limits)
+        if kept.ok:
+            return kept
+        searched = _followed_by_iteration(description, poses, q0, limits)
+        return min(kept, searched, key=lambda path: len(path.lost) + len(path.switches))
     if solver_of(description) is None and description.n >= _WHOLE:
         return _followed_by_iteration(description, poses, q0, limits)
+    return _followed_by_branches(description, poses, q0, limits)
+
+
+def _followed_by_branches(
+    description: Description, poses: Array, q0: Array, limits: bool
+) -> IKPath:
+    """Return the path by the solutions of each pose, of which the one nearest to the last is taken."""
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.allowed if limits else solutions.valid
     jump = _largest_steps(description)

@@ -34,7 +34,7 @@ class IKStatus(IntEnum):
     not_a_pose = 3
     """The matrix has NaN, or its rotation is not orthonormal to 2e-6."""
     not_found = 4
-    """No solution was found by iteration or by ssik, which does not prove that there is none."""
+    """No solution was found, which does not prove that there is none."""
 
 
 class IKFlag(IntFlag):
@@ -81,8 +81,10 @@ class IKSolutions:
     description: Description
     """The robot."""
     complete: bool = True
-    """Whether a pose that is reached has no other solutions than these; False where they were found by ssik or by
-    iteration, which may miss some."""
+    """Whether a pose that is reached has no other solutions than these; False where they were found by iteration, which
+    may miss some, and for arms of seven joints, which have infinitely many."""
+    redundancy: Array | None = None
+    """For arms of seven joints the value of joint 7 that the solutions of each pose have, shape (...), rad."""
 
     @classmethod
     def of_packed(cls, q: Array, packed: bytes, shared: Mapping[str, object]) -> IKSolutions:

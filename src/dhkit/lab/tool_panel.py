@@ -11,6 +11,7 @@ from dhkit.arm import Arm
 from dhkit.description import Array, pose
 from dhkit.errors import DhkitError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
+from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.lab.desk import Desk
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 
@@ -245,8 +246,6 @@ class ToolPanel(Panel):
 def solve_pose(arm: Arm, T: Array, near: Array) -> tuple[IKSolutions, bool]:
     """Return the solutions at a pose, and whether they were found by iteration.
 
-    ssik is not used: its preparation takes many seconds, and a person waits.
-
     Parameters
     ----------
     arm
@@ -257,7 +256,13 @@ def solve_pose(arm: Arm, T: Array, near: Array) -> tuple[IKSolutions, bool]:
         Joint values where the iteration begins, shape (n,), rad and m.
     """
     family = classify(arm.description)
+    if family.redundant is not None:
+        # At the redundancy of the joint values before, so that the tool moves and the arm does not swing.
+        found = arm.ik(T, seed=near)
+        return (found if found.valid.any() else arm.ik(T)), False
     if family.closed_form or family.neighbour is not None:
+        return arm.ik(T), False
+    if arm.description.kinds == "RRRRRR" and six_joints(arm.description).two_parallel is not None:
         return arm.ik(T), False
     return arm.ik_numeric(T, near, restarts=MAX_RESTARTS, position_only=arm.n < 6), True
 

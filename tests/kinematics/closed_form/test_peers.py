@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ssik_peer
 from dhkit import Arm
 from dhkit.bench.contenders import Workload
 from dhkit.bench.peers import eaik
 from dhkit.description import library_robot
 from dhkit.kinematics import forward_kinematics, inverse_kinematics, solve_numerically
-from dhkit.kinematics.external import solve_externally
 from ik_checks import FAMILY_A, FAMILY_B, gaps, measures
 from random_arms import states
 
@@ -57,9 +57,8 @@ def test_ssik_finds_the_same_solutions(law):
         arm = Arm.load(name)
         q = regular_states(arm.description, law.samples(1000) // 10)
         T = arm.fk(q)
-        solutions, theirs = arm.ik(T), solve_externally(arm.description, T)
-        for k in range(len(q)):
-            found = theirs.q[k][theirs.valid[k]]
+        solutions = arm.ik(T)
+        for k, found in enumerate(ssik_peer.solutions_of(arm.description, T)):
             ours = solutions.q[k][solutions.valid[k]]
             law.holds(
                 "distance of the sets of solutions to ssik's", away(ours, found), SAME, (name, q[k])

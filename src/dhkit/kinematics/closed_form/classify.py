@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 from dhkit.description import Description, takes_robot
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.kinematics.axes import TOLERANCE, Axes
-from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret
+from dhkit.kinematics.closed_form import (
+    arm_angle,
+    planar,
+    spherical_shoulder,
+    spherical_wrist,
+    three_parallel,
+    turret,
+)
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Family, Fit
 
 FAMILIES = (
@@ -25,6 +33,16 @@ FAMILIES = (
     Family("slider", planar.slider_fit, planar.slider_formulas),
 )
 """Families of closed forms, in the order in which they are tried."""
+REDUNDANT = (
+    Family("arm_angle", arm_angle.arm_angle_fit, arm_angle.arm_angle_formulas, "arm angle"),
+    Family(
+        "spherical_shoulder",
+        spherical_shoulder.spherical_shoulder_fit,
+        spherical_shoulder.spherical_shoulder_formulas,
+        "joint 7",
+    ),
+)
+"""Families of arms of seven joints with a closed form at a given value, in the order in which they are tried."""
 _EXACT_MEMBER = 2e-16
 """Tolerance within which an arm misses a family by rounding alone."""
 _NEAR_MISSES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
@@ -44,6 +62,9 @@ class Classification:
     neighbour: tuple[Family, Fit] | None = None
     """Family of six joints and parameters of its member that this arm misses by at most 1e-3; the arm's own family if
     it misses that by more than rounding; None if the arm is a member, or is not near a family."""
+    redundant: tuple[Family, Fit] | None = None
+    """Family of seven joints with a closed form at a given value, and the arm's parameters in it; None if the arm is no
+    member."""
 
     @property
     def closed_form(self) -> bool:
@@ -105,6 +126,11 @@ def classify(description: Description) -> Classification:
         is_exact = exactly is not None and exactly[0] is family
         meets_all = fit.coordinates == ALL_COORDINATES
         return Classification(words, family, fit, found if meets_all and not is_exact else None)
+    redundant = _first(axes, REDUNDANT)
+    if redundant is not None:
+        family, fit = redundant
+        value = f"closed form at a given {family.redundancy}, {len(fit.branches)} branches"
+        return Classification(f"{kinds}, {fit.geometry}: {value}", None, None, redundant=redundant)
     words = f"{kinds}: no closed form known"
     near = _nearest_family(description)
     if near is not None:
@@ -123,9 +149,9 @@ def _nearest_family(description: Description) -> tuple[Family, Fit] | None:
     return None
 
 
-def _first(axes: Axes) -> tuple[Family, Fit] | None:
+def _first(axes: Axes, families: Sequence[Family] = FAMILIES) -> tuple[Family, Fit] | None:
     """Return the first family that has these axes, and their fit; None if there is none."""
-    for family in FAMILIES:
+    for family in families:
         fit = family.fit(axes)
         if fit is not None:
             return family, fit

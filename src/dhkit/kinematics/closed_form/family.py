@@ -92,6 +92,8 @@ class Family:
     """Returns an arm's fit from its axes at zero joint positions; None if it is not a member."""
     formulas: Callable[[Mapping[str, SX], PoseSymbols], list[Branch]]
     """Returns the branches in the order of ``Fit.branches``, from named parameters and the pose."""
+    redundancy: str = ""
+    """What is given besides the pose, for seven joints: ``joint 7`` or ``arm angle``; it is ``PoseSymbols.free``."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,7 @@ class PoseSymbols:
     structure: str = ""
     """Structure of the fit."""
     free: Pair = (1.0, 0.0)
-    """Angle of the free joint at a wrist singularity, as a pair."""
+    """Angle of the free joint at a wrist singularity, or the redundancy of seven joints, as a pair."""
     free_1: Pair = (1.0, 0.0)
     """Angle of joint 1 where the point that it turns is on its axis, as a pair."""
     noise: SX = 0.0

@@ -104,6 +104,22 @@ def weighted_sum(
     return x, y, z
 
 
+def turned_about_z(vector: tuple[SX, SX, SX], angle: Pair, sense: float = 1.0) -> tuple[SX, SX, SX]:
+    """Return Rz(angle) vector, or Rz(-angle) vector for ``sense`` -1."""
+    x, y, z = vector
+    c = angle[0]
+    s = angle[1] * sense
+    return x * c - y * s, x * s + y * c, z
+
+
+def turned_about_x(vector: tuple[SX, SX, SX], angle: Pair, sense: float = 1.0) -> tuple[SX, SX, SX]:
+    """Return Rx(angle) vector, or Rx(-angle) vector for ``sense`` -1."""
+    x, y, z = vector
+    c = angle[0]
+    s = angle[1] * sense
+    return x, y * c - z * s, y * s + z * c
+
+
 def unit_pair(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
     """Return (x, y) over its length; ``otherwise`` where it is shorter than MIN_DIRECTION times ``scale``."""
     length = hypot(x, y)

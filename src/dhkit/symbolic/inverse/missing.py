@@ -7,7 +7,7 @@ import numpy as np
 from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element
 
-_INSTEAD = "use arm.ik_numeric, or arm.ik with the package ssik (pip install 'dhkit-robotics[ik]')"
+_INSTEAD = "use arm.ik, which needs six or seven revolute joints, or arm.ik_numeric"
 
 
 def why_not(chain: ExactChain) -> str:

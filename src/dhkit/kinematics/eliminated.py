@@ -1,0 +1,99 @@
+"""Inverse kinematics of six revolute joints without a closed form, by elimination, as solutions with a status."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import Array, Description
+from dhkit.errors import ModelError
+from dhkit.kernels import pose_rows
+from dhkit.kinematics.candidates import are_poses, collect, orthonormal
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES
+from dhkit.kinematics.manipulability import freedoms
+from dhkit.kinematics.polynomial.six_joints import six_joints
+from dhkit.kinematics.solutions import IKSolutions
+
+SAME_ANGLE = 1e-6
+"""Angles that differ by less, rad, count as equal when solutions are sorted."""
+
+
+def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
+    """Return the solutions of T_world_tool(q) = T of an arm of six revolute joints, from the roots of a polynomial.
+
+    See :mod:`dhkit.kinematics.polynomial`. The first call for an arm of general geometry compares six ways of
+    elimination, for a second or two.
+
+    Parameters
+    ----------
+    description
+        The robot; six revolute joints.
+    T
+        Poses of the tool in the world, shape (..., 4, 4).
+
+    Returns
+    -------
+    IKSolutions
+        Branches ``"solution 1"`` ... ``"solution B"``, B the largest number found for a pose of the batch and at least
+        1. They are ordered by their joint values, the first joint's first: the same number at another pose need not
+        be the same way to reach. Singular branches are not flagged. ``complete`` tells whether each pose has as many
+        solutions as its polynomial has real roots; it is False for arms that never move in all directions, whose
+        solutions are curves. A pose that has none of either is ``out_of_reach``, other poses
+        without a solution are ``not_found``. ``distance`` is NaN where nothing was found.
+
+    Raises
+    ------
+    ModelError
+        The arm has prismatic joints, or not six joints.
+    ValueError, TypeError
+        T has not shape (..., 4, 4), or is not numeric.
+    """
+    if description.numbers.prismatic.any() or description.n != 6:
+        words = classify(description).words
+        raise ModelError(f"{description.name} is {words}; ik_numeric solves any arm")
+    poses = pose_rows(T)
+    posed = are_poses(poses)
+    goals = orthonormal(poses[posed])
+    found = six_joints(description)(goals.reshape(-1, 16))
+
+    rows = np.flatnonzero(posed)
+    table = ordered(found.q, rows[found.owner], posed.size)
+    B = table.shape[1]
+    none_exist = np.zeros(posed.size, dtype=bool)
+    none_exist[rows] = found.is_complete & (found.counts == 0)
+    return collect(
+        description,
+        table.reshape(*poses.shape[:-2], B, description.n),
+        np.full(posed.shape, np.nan),
+        positions=poses[..., :3, 3],
+        posed=posed,
+        branches=tuple(f"solution {k + 1}" for k in range(B)),
+        met=ALL_COORDINATES,
+        complete=bool(found.is_complete.all()) and not has_curves(description),
+        none_exist=none_exist.reshape(posed.shape),
+    )
+
+
+@lru_cache(maxsize=64)
+def has_curves(description: Description) -> bool:
+    """Return whether the arm never moves its tool in as many directions as it has joints, so that joints are redundant.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    return freedoms(description, "whole") < description.n
+
+
+def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
+    """Return solutions (K, n) sorted by the poses that they belong to, shape (poses, B, n), filled up with NaN."""
+    counts = np.bincount(owner, minlength=poses)
+    order = np.lexsort([*np.rint(q.T / SAME_ANGLE)[::-1], owner])
+    place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
+    table = np.full((poses, max(1, int(counts.max(initial=0))), q.shape[1]), np.nan)
+    table[owner[order], place] = q[order]
+    return table

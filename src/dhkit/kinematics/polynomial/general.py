@@ -1,0 +1,340 @@
+"""Six revolute joints of any geometry, by the elimination of Raghavan and Roth.
+
+Joints i, i + 1 and i + 2 move the line of axis i + 3, and so do the three other joints from the other side; axis i + 3
+itself does not move it. A line with direction n through the point f gives 14 equations
+
+    f, n, f x n, (f . f) n - 2 (f . n) f, f . f, f . n    equal on both sides,
+
+which are bilinear in cosine and sine of two joints on each side, and linear in those of joint i (Raghavan and Roth
+1993, Inverse kinematics of the general 6R manipulator and related linkages, J. Mech. Des. 115). Eight combinations of
+them serve to eliminate the two joints of the other side; the six that are left, and the six multiplied by e^(i q) of
+joint i + 1, are linear in 12 products of powers of e^(i q) of joints i + 1 and i + 2: their determinant is the
+polynomial.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.cached_property import cached_property
+from dhkit.description import Array
+from dhkit.description.poses import inverse_pose
+from dhkit.kinematics.axes import Axes
+
+Complex: TypeAlias = "NDArray[np.complex128]"
+Coefficients: TypeAlias = "tuple[Array, Array, Array]"
+"""What 1, the cosine and the sine of joint i are multiplied by."""
+
+_EQUATIONS = 14
+_PRODUCTS = 8
+"""Number of products of cosines and sines of the two joints that are eliminated, without 1."""
+_ANGLES = 2 * np.pi / 3 * np.arange(3)
+_OF_VALUES = np.linalg.inv(np.stack([np.ones(3), np.cos(_ANGLES), np.sin(_ANGLES)], axis=1))
+"""From values at three angles to the factors of 1, cosine and sine."""
+_OF_TWO_ANGLES = np.kron(_OF_VALUES, _OF_VALUES)
+_AS_POWERS = np.array([[0, 1, 0], [0.5, 0, 0.5], [0.5j, 0, -0.5j]])
+"""1, cosine and sine times x = e^(i q), as factors of 1, x and x^2."""
+_CHANGES = (1e-15, 1e-14, 1e-13)
+"""Shares of their largest entry by which matrices are changed that are exactly singular."""
+_OF_TWO_POWERS = np.kron(_AS_POWERS, _AS_POWERS)
+
+
+@dataclass(frozen=True, eq=False)
+class General:
+    """An arm of six revolute joints, with the joint that the polynomial is in."""
+
+    directions: Array
+    """Directions of the axes at zero joint positions, shape (6, 3)."""
+    points: Array
+    """A point of each axis, shape (6, 3), as shares of the reach."""
+    T_tool_world: Array
+    """The world in the tool at zero joint positions, shape (4, 4), m."""
+    length: float
+    """The reach, m, by which lengths are divided."""
+    joint: int = 3
+    """Joint i: 1, 2 or 3."""
+    is_reversed: bool = False
+    """Whether joints are counted from the tool, so that joint i is joint 7 - i of the robot."""
+
+    @classmethod
+    def of(cls, axes: Axes) -> General:
+        """Return an arm; see :meth:`variants`."""
+        return cls(
+            axes.directions, axes.points / axes.scale, inverse_pose(axes.T_world_tool), axes.scale
+        )
+
+    def variants(self) -> list[General]:
+        """Return the six ways of elimination: for some arms some of them have a polynomial that is always 0."""
+        # M = E_1 ... E_6 with rotations E_i about the axes. Then M^-1 = E_6^-1 ... E_1^-1, whose axes are the opposite.
+        from_tool = replace(
+            self, directions=-self.directions[::-1], points=self.points[::-1], is_reversed=True
+        )
+        return [replace(arm, joint=joint) for joint in (3, 2, 1) for arm in (self, from_tool)]
+
+    def first_angle(self, poses: Array) -> Array:
+        """Return the first angle at which the polynomial is evaluated, shape (N,)."""
+        return np.full(len(poses), 0.1)
+
+    def values(self, poses: Array, angles: Array) -> Array:
+        """Return the polynomial's values.
+
+        Parameters
+        ----------
+        poses
+            Poses of the tool in the world, shape (N, 16), m.
+        angles
+            Angles of the joint, shape (N, S), rad.
+        """
+        reduced, _ = self._reduced(self._motions(poses))
+        values = [np.linalg.det(_matrix(reduced, angle)) for angle in angles.T]
+        # The determinant is real up to a constant factor of absolute value 1.
+        return np.asarray((np.stack(values, axis=1) * self._phase).real)
+
+    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return joint values near the solutions at roots of the polynomial.
+
+        Parameters
+        ----------
+        poses
+            Shape (K, 16), m.
+        angles
+            A root for each, shape (K,), rad.
+
+        Returns
+        -------
+        tuple[NDArray[np.intp], Array]
+            Indices of the roots, shape (L,), and joint values, shape (L, 6), rad.
+        """
+        motions = self._motions(poses)
+        reduced, other = self._reduced(motions)
+        kept = angles
+        # The null vector holds the products x^j y^k, j = 0 to 3, k = 0 to 2, of x and y on the unit circle.
+        null = _null_vectors(_matrix(reduced, kept)).reshape(-1, 4, 3)
+        second = np.angle((null[:, 1:] * null[:, :-1].conj()).sum(axis=(1, 2)))
+        third = np.angle((null[:, :, 1:] * null[:, :, :-1].conj()).sum(axis=(1, 2)))
+
+        # The equations, eight of which were to eliminate the other joints, now give the products of those.
+        constant, cosine, sine = self._near_side
+        factors = (
+            constant + np.cos(kept)[:, None, None] * cosine + np.sin(kept)[:, None, None] * sine
+        )
+        near = np.einsum("nij,nj->ni", factors, _products(second, third))
+        Q, R = np.linalg.qr(other[:, :, 1:])
+        right = np.swapaxes(Q, 1, 2) @ (near - other[:, :, 0])[:, :, None]
+        products = _solved(R, right)
+        # Their order is cos b, sin b, cos a, cos a cos b, cos a sin b, sin a, ...
+        a = np.arctan2(products[:, 5, 0], products[:, 2, 0])
+        b = np.arctan2(products[:, 1, 0], products[:, 0, 0])
+        return np.arange(len(poses)), self._joints(motions, (kept, second, third), (a, b))
+
+    def _joints(
+        self, motions: Array, near: tuple[Array, Array, Array], far: tuple[Array, Array]
+    ) -> Array:
+        """Return all joint values, the last one from the rotation, in the robot's order."""
+        i = self.joint - 1
+        places = self._far_places
+        q = np.zeros((len(motions), 6))
+        for place, angle in zip((i, i + 1, i + 2, *places), (*near, *far), strict=True):
+            q[:, place] = angle
+
+        # E_i E_(i+1) E_(i+2) E_(i+3) = E_(i-1)^-1 ... M ... E_(i+4)^-1.
+        before = [self._rotations(k, q[:, k]) for k in range(i + 3)]
+        after = [self._rotations(k, q[:, k]) for k in range(i + 4, 6)]
+        rest = np.swapaxes(_product(before, len(q)), 1, 2) @ motions[:, :3, :3]
+        rest = rest @ np.swapaxes(_product(after, len(q)), 1, 2)
+        axis = self.directions[i + 3]
+        across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        across /= np.linalg.norm(across)
+        turned = rest @ across
+        q[:, i + 3] = np.arctan2(turned @ np.cross(axis, across), turned @ across)
+        return q[:, ::-1] if self.is_reversed else q
+
+    @property
+    def _far_places(self) -> tuple[int, int]:
+        """Indices, from 0, of the two joints that are eliminated."""
+        return {1: (4, 5), 2: (5, 0), 3: (0, 1)}[self.joint]
+
+    def _motions(self, poses: Array) -> Array:
+        """Return M, the motions from zero joint positions to poses (N, 16) in the world, shape (N, 4, 4)."""
+        M = poses.reshape(-1, 4, 4) @ self.T_tool_world
+        M[:, :3, 3] /= self.length
+        return inverse_poses(M) if self.is_reversed else M
+
+    @cached_property
+    def _phase(self) -> complex:
+        """Complex number of absolute value 1 that makes determinants real."""
+        T = inverse_pose(self.T_tool_world)
+        T[:3, 3] += 0.1 * self.length
+        reduced, _ = self._reduced(self._motions(T.reshape(1, 16)))
+        value = np.linalg.det(_matrix(reduced, np.array([0.3])))[0]
+        return complex(np.conj(value) / abs(value)) if value else 1.0
+
+    @cached_property
+    def _near_side(self) -> Coefficients:
+        """The equations' side of joint i, in products of the two joints after it, shape (14, 9) each.
+
+        Its origin is on axis i, about which R = n n^T + cos q (1 - n n^T) + sin q [n] turns all vectors.
+        """
+        i = self.joint - 1
+        origin = self.points[i]
+        values = []
+        for second in _ANGLES:
+            for third in _ANGLES:
+                line = self._moved(i + 2, third, self.points[i + 3], self.directions[i + 3])
+                point, direction = self._moved(i + 1, second, *line)
+                values.append(_equations(point - origin, direction))
+        # Of values at nine pairs of angles, shape (9, 14), to factors of the products.
+        still = (_OF_TWO_ANGLES @ np.array(values)).T
+
+        axis = self.directions[i]
+        along = np.outer(axis, axis)
+        constant = _of_vectors(along) @ still
+        constant[12:] = still[12:]
+        return constant, _of_vectors(np.eye(3) - along) @ still, _of_vectors(_cross(axis)) @ still
+
+    def _reduced(self, motions: Array) -> tuple[tuple[Any, Any, Any], Array]:
+        """Return the six equations without the far joints, shape (N, 6, 9) each, and the far side, shape (N, 14, 9).
+
+        The six are in powers of e^(i q) of joints i + 1 and i + 2.
+        """
+        other = self._far_side(motions)
+        Q, _ = np.linalg.qr(other[:, :, 1:], mode="complete")
+        null = np.swapaxes(Q[:, :, _PRODUCTS:], 1, 2)
+        constant, cosine, sine = (null @ side for side in self._near_side)
+        constant[:, :, 0] -= np.einsum("nij,nj->ni", null, other[:, :, 0])
+        constant, cosine, sine = (side @ _OF_TWO_POWERS for side in (constant, cosine, sine))
+        return (constant, cosine, sine), other
+
+    def _far_side(self, motions: Array) -> Array:
+        """Return the equations' other side in products of the two far joints, shape (N, 14, 9)."""
+        i = self.joint - 1
+        a, b = self._far_places
+        count = len(motions)
+        R = motions[:, :3, :3]
+        position = motions[:, :3, 3]
+        values = []
+        for first in _ANGLES:
+            for second in _ANGLES:
+                line = (self.points[i + 3], self.directions[i + 3])
+                # From the line outwards: joints behind it, from axis 5 on, then M, then joints 1 and 2.
+                for place, angle in ((a, first), (b, second)):
+                    if place > i + 3:
+                        line = self._moved(place, -angle, *line)
+                point = np.broadcast_to(line[0], (count, 3))
+                direction = np.broadcast_to(line[1], (count, 3))
+                point = np.einsum("nij,nj->ni", R, point) + position
+                direction = np.einsum("nij,nj->ni", R, direction)
+                for place, angle in ((a, first), (b, second)):
+                    if place < i:
+                        point, direction = self._moved(place, -angle, point, direction)
+                values.append(_equations(point - self.points[i], direction))
+        side: Array = np.einsum("kl,lnj->njk", _OF_TWO_ANGLES, np.array(values))
+        return side
+
+    def _moved(
+        self, place: int, angle: float, point: Array, direction: Array
+    ) -> tuple[Array, Array]:
+        """Return points and directions (..., 3) turned about an axis."""
+        R = self._rotations(place, np.array([angle]))[0]
+        origin = self.points[place]
+        return origin + (point - origin) @ R.T, direction @ R.T
+
+    def _rotations(self, place: int, angle: Array) -> Array:
+        """Return rotations about an axis by angles (N,), shape (N, 3, 3)."""
+        axis = self.directions[place]
+        along = np.outer(axis, axis)
+        c = np.cos(angle)[:, None, None]
+        s = np.sin(angle)[:, None, None]
+        rotations: Array = along + c * (np.eye(3) - along) + s * _cross(axis)
+        return rotations
+
+
+def inverse_poses(T: Array) -> Array:
+    """Return the inverses of poses (N, 4, 4)."""
+    inverse = np.zeros_like(T)
+    R = np.swapaxes(T[:, :3, :3], 1, 2)
+    inverse[:, :3, :3] = R
+    inverse[:, :3, 3] = -np.einsum("nij,nj->ni", R, T[:, :3, 3])
+    inverse[:, 3, 3] = 1.0
+    return inverse
+
+
+def _equations(point: Array, direction: Array) -> Array:
+    """Return one side of the equations for a line, shape (..., 14), from a point and the direction, shape (..., 3)."""
+    f_f = np.sum(point * point, axis=-1, keepdims=True)
+    f_n = np.sum(point * direction, axis=-1, keepdims=True)
+    moment = np.cross(point, direction)
+    mixed = f_f * direction - 2 * f_n * point
+    return np.concatenate([point, direction, moment, mixed, f_f, f_n], axis=-1)
+
+
+def _of_vectors(R: Array) -> Array:
+    """Return the matrix, shape (14, 14), that multiplies the equations' four vectors by R, and their scalars by 0."""
+    matrix = np.zeros((_EQUATIONS, _EQUATIONS))
+    matrix[:12, :12] = np.kron(np.eye(4), R)
+    return matrix
+
+
+def _products(second: Array, third: Array) -> Array:
+    """Return the products of 1, cosine and sine of one angle with those of another, shape (N, 9)."""
+    of_second = np.stack([np.ones_like(second), np.cos(second), np.sin(second)], axis=1)
+    of_third = np.stack([np.ones_like(third), np.cos(third), np.sin(third)], axis=1)
+    products: Array = (of_second[:, :, None] * of_third[:, None, :]).reshape(-1, 9)
+    return products
+
+
+def _matrix(reduced: tuple[Complex, Complex, Complex], angle: Array) -> Complex:
+    """Return the matrix whose determinant is the polynomial, shape (N, 12, 12), at angles (N,)."""
+    constant, cosine, sine = reduced
+    six = constant + np.cos(angle)[:, None, None] * cosine + np.sin(angle)[:, None, None] * sine
+    matrix = np.zeros((len(six), 12, 12), dtype=complex)
+    matrix[:, :6, :9] = six
+    matrix[:, 6:, 3:] = six
+    return matrix
+
+
+def _null_vectors(matrices: Complex) -> Complex:
+    """Return the vectors that nearly singular matrices (N, k, k) take nearly to 0, shape (N, k).
+
+    Inverse iteration: the solution of A x = b is long in their direction.
+    """
+    b = np.random.default_rng(0).normal(size=(matrices.shape[1], 1))
+    solved = _solved(matrices, b)[:, :, 0]
+    length = np.linalg.norm(solved, axis=1, keepdims=True)
+    return np.asarray(solved / np.where(length > 0, length, 1.0))
+
+
+def _solved(matrices: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
+    """Return the solutions of linear equations (N, k, k) and (N or 1, k, 1), large where a matrix is nearly singular.
+
+    Should a matrix be exactly singular, all are changed by a random one, hardly larger than rounding.
+    """
+    size = matrices.shape[1]
+    usable = np.isfinite(matrices).all(axis=(1, 2))[:, None, None]
+    changed = np.where(usable, matrices, np.eye(size))
+    random = np.random.default_rng(0).uniform(-1.0, 1.0, (size, size))
+    largest = np.abs(changed).max(axis=(1, 2), keepdims=True)
+    for change in (0.0, *_CHANGES):
+        try:
+            return np.asarray(np.linalg.solve(changed + change * largest * random, right))
+        except np.linalg.LinAlgError:
+            continue
+    return np.zeros((len(matrices), *right.shape[-2:]), dtype=matrices.dtype)
+
+
+def _product(rotations: list[Array], count: int) -> Array:
+    """Return the product of rotations (N, 3, 3), the first on the left; unit matrices for none."""
+    product = np.broadcast_to(np.eye(3), (count, 3, 3))
+    for R in rotations:
+        product = product @ R
+    return product
+
+
+def _cross(axis: Array) -> Array:
+    """Return the matrix of the cross product axis x v."""
+    x, y, z = axis
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,0 +1,173 @@
+"""Inverse kinematics of six revolute joints: which elimination suits an arm, and all solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dhkit.cached_property import cached_property
+from dhkit.description import Array, Description
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.forward import forward_kinematics
+from dhkit.kinematics.numeric import refined, solve_numerically
+from dhkit.kinematics.polynomial.general import General
+from dhkit.kinematics.polynomial.solve import Elimination, Found, distinct, solve
+from dhkit.kinematics.polynomial.two_parallel import TwoParallel
+
+_MOST = 16
+"""Largest number of solutions of a pose."""
+_TRIALS = 64
+"""Number of random poses by which eliminations are compared."""
+_FOUND = 1e-5
+"""Largest difference, rad, of a solution from the joint values that made the pose."""
+_MISSED_COUNTS = 4
+"""Number of poses with an incomplete set of solutions that one missed solution counts as."""
+_DISPLACEMENTS = (1e-4, 1e-3)
+"""Sizes of displacements, rad and share of the reach: the roots at a double root's pose are then 1e-2 apart."""
+_STARTS = 32
+_MAX_ROUNDS = 8
+"""Number of random starts in a round of iterations, and largest number of rounds."""
+_CLOSES = 1e-11
+"""Error to which a solution closes that iteration finds: share of the reach, and rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class SixJoints:
+    """The solver of an arm of six revolute joints."""
+
+    description: Description
+
+    @cached_property
+    def two_parallel(self) -> TwoParallel | None:
+        """The arm as one with parallel axes 2 and 3; None if it is not of that kind."""
+        return TwoParallel.fit(Axes.of(self.description))
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """The way in which joints are eliminated.
+
+        Of those for any geometry it is the one that finds most poses of random joint values, and most of them in full.
+        """
+        if self.two_parallel is not None:
+            return self.two_parallel
+        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, 6))
+        poses = forward_kinematics(self.description, q).reshape(-1, 16)
+        variants = General.of(Axes.of(self.description)).variants()
+        failures = [self._failures(variant, q, poses) for variant in variants]
+        return variants[int(np.argmin(failures))]
+
+    def _failures(self, elimination: Elimination, q: Array, poses: Array) -> int:
+        """Return how badly an elimination fails at poses that were made of joint values (N, 6)."""
+        found = solve(self.description, elimination, poses)
+        apart = 2 * np.abs(np.sin((found.q - q[found.owner]) / 2)).max(axis=1)
+        is_found = np.zeros(len(poses), dtype=bool)
+        is_found[found.owner[apart < _FOUND]] = True
+        return int(_MISSED_COUNTS * np.sum(~is_found) + np.sum(~found.is_complete))
+
+    def __call__(self, poses: Array) -> Found:
+        """Return the solutions of poses, shape (N, 16), with orthonormal rotations, m.
+
+        Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more from the
+        solutions of poses beside them, where the roots lie apart, and then by iteration from random starts.
+        """
+        found = solve(self.description, self.elimination, poses)
+        rows = np.flatnonzero(~found.is_complete)
+        if len(rows):
+            found = _with(found, rows, self._from_beside(poses[rows]))
+            rows = rows[~found.is_complete[rows]]
+        if len(rows):
+            found = _with(found, rows, self._iterated(poses[rows], found, rows))
+        return found
+
+    def _from_beside(self, poses: Array) -> Found:
+        """Return solutions of poses (M, 16) by Newton's method from those of displaced poses.
+
+        To both sides, for of two solutions that nearly coincide there is perhaps none at one side.
+        """
+        q = []
+        owner = []
+        # Where two solutions meet, one side has two more than the pose itself.
+        expected = np.full(len(poses), _MOST, dtype=np.intp)
+        is_exact = np.ones(len(poses), dtype=bool)
+        for displaced in _displaced(poses, Axes.of(self.description).scale):
+            beside = solve(self.description, self.elimination, displaced)
+            ends, closed = refined(self.description, beside.q, poses[beside.owner])
+            q.append(ends[closed])
+            owner.append(beside.owner[closed])
+            expected = np.minimum(expected, beside.expected)
+            is_exact &= beside.is_exact
+        return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact)
+
+    def _iterated(self, poses: Array, known: Found, rows: NDArray[np.intp]) -> Found:
+        """Return what iterations from random starts find, until a round of them finds nothing new.
+
+        Parameters
+        ----------
+        poses
+            Shape (M, 16), m.
+        known, rows
+            Solutions that are known, and the indices of the poses there, shape (M,).
+        """
+        place = np.full(len(known.expected), -1)
+        place[rows] = np.arange(len(rows))
+        is_asked = place[known.owner] >= 0
+        q = known.q[is_asked]
+        owner = place[known.owner[is_asked]]
+
+        rng = np.random.default_rng(0)
+        waiting = np.arange(len(rows))
+        for _ in range(_MAX_ROUNDS):
+            of_start = np.repeat(waiting, _STARTS)
+            starts = rng.uniform(-np.pi, np.pi, (len(of_start), q.shape[1]))
+            goals = poses[of_start].reshape(-1, 4, 4)
+            found = solve_numerically(
+                self.description, goals, starts, restarts=0, tolerance=_CLOSES, limits=False
+            )
+            reached = found.valid[:, 0]
+            before = np.bincount(owner, minlength=len(rows))
+            q, owner = distinct(
+                np.concatenate([q, found.q[reached, 0]]),
+                np.concatenate([owner, of_start[reached]]),
+            )
+            waiting = waiting[np.bincount(owner, minlength=len(rows))[waiting] > before[waiting]]
+            if not len(waiting):
+                break
+        return Found(q, owner, np.zeros(len(rows), dtype=int), np.zeros(len(rows), dtype=bool))
+
+
+def _displaced(poses: Array, length: float) -> Iterator[Array]:
+    """Yield poses (N, 16) that are moved and turned a little, by random amounts, each to both sides."""
+    rng = np.random.default_rng(0)
+    for size in _DISPLACEMENTS:
+        phi = size * rng.uniform(-1.0, 1.0, 3)
+        shift = size * length * rng.uniform(-1.0, 1.0, 3)
+        for sign in (1.0, -1.0):
+            displaced = poses.reshape(-1, 4, 4).copy()
+            displaced[:, :3, :3] = (
+                Rotation.from_rotvec(sign * phi).as_matrix() @ displaced[:, :3, :3]
+            )
+            displaced[:, :3, 3] += sign * shift
+            yield displaced.reshape(-1, 16)
+
+
+@lru_cache(maxsize=64)
+def six_joints(description: Description) -> SixJoints:
+    """Return the solver of an arm of six revolute joints."""
+    return SixJoints(description)
+
+
+def _with(found: Found, rows: NDArray[np.intp], more: Found) -> Found:
+    """Return solutions with those of some of the poses, whose indices are ``rows``, added."""
+    q, owner = distinct(
+        np.concatenate([found.q, more.q]), np.concatenate([found.owner, rows[more.owner]])
+    )
+    expected = found.expected.copy()
+    is_exact = found.is_exact.copy()
+    expected[rows] = more.expected
+    is_exact[rows] = more.is_exact
+    return Found(q, owner, expected, is_exact)

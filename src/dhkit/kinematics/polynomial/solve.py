@@ -1,0 +1,112 @@
+"""All solutions of poses of an arm of six revolute joints, from the real roots of its polynomial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Description
+from dhkit.kinematics.numeric import refined
+from dhkit.kinematics.polynomial import trigonometric
+
+_CHUNK = 1_024
+"""Poses that are solved together; their arrays take some 10 MB."""
+_INEXACT = 1e-6
+"""Largest coefficient beyond degree 8, relative to the others, of a polynomial that is trusted."""
+_SAME_SOLUTION = 1e-5
+"""Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
+_NEIGHBOURS = 4
+"""Number of solutions, in the order of a number that is the same for equal ones, that each is compared with."""
+
+
+class Elimination(Protocol):
+    """A way to eliminate all joints but one."""
+
+    def first_angle(self, poses: Array) -> Array:
+        """Return the first angle at which the polynomial is evaluated, shape (N,), for poses (N, 16)."""
+
+    def values(self, poses: Array, angles: Array) -> Array:
+        """Return values of the polynomial, shape (N, S), at angles (N, S)."""
+
+    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array]:
+        """Return indices of poses and joint values (L, 6) near solutions, for roots (K,) of poses (K, 16)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Solutions of a batch of poses."""
+
+    q: Array
+    """Shape (K, 6), rad, those of a pose together."""
+    owner: NDArray[np.intp]
+    """Index of the pose of each, shape (K,), in ascending order."""
+    expected: NDArray[np.intp]
+    """Number of real roots of each pose's polynomial, shape (N,); 1 if there are only some that are nearly real."""
+    is_exact: NDArray[np.bool_]
+    """Whether the polynomial is known well enough for that number, shape (N,)."""
+
+    @property
+    def is_complete(self) -> NDArray[np.bool_]:
+        """Whether a pose has as many solutions as its polynomial has real roots, shape (N,)."""
+        return self.is_exact & (self.counts >= self.expected)
+
+    @property
+    def counts(self) -> NDArray[np.intp]:
+        """Number of solutions of each pose, shape (N,)."""
+        return np.bincount(self.owner, minlength=len(self.expected))
+
+
+def solve(description: Description, elimination: Elimination, poses: Array) -> Found:
+    """Return the solutions of poses, shape (N, 16), with orthonormal rotations, m."""
+    q = [np.empty((0, 6))]
+    owner = [np.empty(0, dtype=np.intp)]
+    expected = np.zeros(len(poses), dtype=np.intp)
+    is_exact = np.zeros(len(poses), dtype=bool)
+    for begin in range(0, len(poses), _CHUNK):
+        some = slice(begin, begin + _CHUNK)
+        found = _solve(description, elimination, poses[some])
+        q.append(found.q)
+        owner.append(found.owner + begin)
+        expected[some] = found.expected
+        is_exact[some] = found.is_exact
+    return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact)
+
+
+def _solve(description: Description, elimination: Elimination, poses: Array) -> Found:
+    """Return the solutions of a chunk of poses."""
+    with np.errstate(all="ignore"):
+        first = elimination.first_angle(poses)
+        values = elimination.values(poses, first[:, None] + trigonometric.angles())
+        c, beyond = trigonometric.coefficients(values)
+        roots = trigonometric.real_roots(c, beyond)
+        goals = poses[roots.owner]
+        of_root, starts = elimination.starts(goals, roots.angle + first[roots.owner])
+    is_number = np.isfinite(starts).all(axis=1)
+    of_root = of_root[is_number]
+    q, closed = refined(description, starts[is_number], goals[of_root])
+    q, owner = distinct(q[closed], roots.owner[of_root[closed]])
+
+    expected = np.bincount(roots.owner[roots.is_real], minlength=len(poses))
+    expected[roots.owner] = np.maximum(expected[roots.owner], 1)
+    return Found(q, owner, expected, beyond < _INEXACT)
+
+
+def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Return solutions (K, n), rad, without those that another one of the same pose equals, and their poses (K,).
+
+    Poses are in ascending order, the solutions of each in no particular one.
+    """
+    # Equal solutions have equal numbers sum_j cos(q_j + j), whole turns included, and so lie next to each other.
+    number = np.cos(q + np.arange(q.shape[1])).sum(axis=1)
+    order = np.lexsort([number, owner])
+    q = q[order]
+    owner = owner[order]
+    is_new = np.ones(len(q), dtype=bool)
+    for lag in range(1, min(_NEIGHBOURS, len(q) - 1) + 1):
+        # |e^(ia) - e^(ib)| = 2 |sin((a - b) / 2)|, about |a - b|.
+        apart = 2 * np.abs(np.sin((q[lag:] - q[:-lag]) / 2)).max(axis=1)
+        is_new[lag:] &= (apart > _SAME_SOLUTION) | (owner[lag:] != owner[:-lag])
+    return q[is_new], owner[is_new]

@@ -1,0 +1,292 @@
+"""Inverse kinematics of seven revolute joints: all solutions at a given value of the redundancy.
+
+The redundancy is the arm angle of arms with a spherical shoulder and a spherical wrist
+(:mod:`dhkit.kinematics.closed_form.arm_angle`), and joint 7 of all others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dhkit.description import (
+    Array,
+    Description,
+    joint_array,
+    lock,
+    world_to_frames,
+    world_to_tool,
+)
+from dhkit.description.frames import carrying, configuration
+from dhkit.description.poses import inverse_pose
+from dhkit.errors import ModelError
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.candidates import collect
+from dhkit.kinematics.chain import Chain
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
+from dhkit.kinematics.eliminated import solve_by_elimination
+from dhkit.kinematics.numeric import solve_numerically
+from dhkit.kinematics.solutions import IKSolutions, IKStatus
+from dhkit.kinematics.solver import Solver, solve_in_closed_form, solver_for
+
+JOINTS = 7
+_LAST = JOINTS - 1
+_LAST_JOINT = "joint 7"
+_TRIED = 32
+"""Number of steps between the values that are tried where none is asked for."""
+_WHOLE_TURN = (-np.pi, np.pi)
+
+
+def solve_redundant(
+    description: Description,
+    T: Array,
+    seed: ArrayLike | None = None,
+    redundancy: ArrayLike | None = None,
+    threads: int = 1,
+) -> IKSolutions:
+    """Return the solutions of T_world_tool(q) = T that have a given value of the redundancy.
+
+    Parameters
+    ----------
+    description
+        The robot; seven revolute joints.
+    T
+        Poses of the tool in the world, shape (..., 4, 4).
+    seed
+        Joint positions, shape (7,) or (..., 7), rad, whose redundancy is taken if ``redundancy`` is not given.
+    redundancy
+        Joint position 7, or the arm angle, shape () or (...), rad. If neither is given, 33 values are tried, of joint 7
+        from the middle of its limits outward, of the arm angle from 0 to both sides. Each pose has the first one with a
+        solution inside all limits, or that of a solution by iteration, or else the first one with any solution.
+    threads
+        Number of threads for a large batch of a closed form.
+
+    Raises
+    ------
+    ModelError
+        The arm has prismatic joints, or not seven joints.
+    ValueError, TypeError
+        ``redundancy`` or ``seed`` does not fit, or is not finite.
+    """
+    if description.n != JOINTS or description.numbers.prismatic.any():
+        words = classify(description).words
+        raise ModelError(f"{description.name} is {words}; ik_numeric solves any arm")
+    batch = T.shape[:-2]
+    solver = _AtRedundancy.of(description)
+    values = _asked_for(description, seed, redundancy, batch)
+    if values is None:
+        return _at_tried_values(solver, T, threads)
+    return solver(T, values, threads)
+
+
+def redundancy_of(description: Description, q: Array) -> Array:
+    """Return the redundancy of joint positions (..., 7), shape (...), rad: the arm angle in (-pi, pi], or joint 7.
+
+    Parameters
+    ----------
+    description
+        The robot; seven revolute joints.
+    q
+        Joint positions, shape (..., 7), rad.
+
+    Returns
+    -------
+    Array
+        Shape (...), rad.
+    """
+    found = classify(description).redundant
+    if found is None or found[0].redundancy == _LAST_JOINT:
+        return q[..., _LAST]
+
+    # The arm angle is that of axis 4 about the line from S to W, from the direction u x (W - S), with axis 1 along u.
+    axes = Axes.of(description)
+    chain = Chain.of(axes)
+    frames = carrying(description.convention, np.moveaxis(world_to_frames(description, q), -3, 0))
+    axis_4 = frames[3, ..., :3, 2]
+    shoulder = chain.T_world_first[:3, 3]
+    wrist = (world_to_tool(description, q) @ inverse_pose(chain.T_last_tool))[..., :3, 3]
+    line = _unit(wrist - shoulder)
+    across = np.cross(axes.direction(1), line)
+    # With the wrist on axis 1, the first frame's y axis stands for it, as in the closed form.
+    on_axis_1 = np.linalg.norm(across, axis=-1, keepdims=True) <= MIN_DIRECTION
+    level = np.where(on_axis_1, chain.T_world_first[:3, 1], _unit(across))
+    up = np.cross(line, level)
+    angle: Array = np.arctan2((axis_4 * up).sum(axis=-1), (axis_4 * level).sum(axis=-1))
+    return angle
+
+
+def _unit(vectors: Array) -> Array:
+    """Return vectors (..., 3) over their lengths; 0 stays 0."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    directions: Array = vectors / np.where(length > 0, length, 1.0)
+    return directions
+
+
+@dataclass(frozen=True, eq=False)
+class _AtRedundancy:
+    """The solver of an arm at given redundancies: a closed form, or elimination for the joints before the last."""
+
+    description: Description
+    method: Solver | Description
+    """A closed form, or the arm with joint 7 locked at 0, for elimination."""
+
+    @classmethod
+    @lru_cache(maxsize=64)
+    def of(cls, description: Description) -> _AtRedundancy:
+        """Return the solver of an arm."""
+        found = classify(description).redundant
+        if found is not None:
+            return cls(description, solver_for(description, *found))
+        return cls(description, lock(description, {_LAST: 0}))
+
+    def __call__(self, T: Array, values: Array, threads: int = 1) -> IKSolutions:
+        """Return the solutions of poses (..., 4, 4) at redundancies (...), rad."""
+        if isinstance(self.method, Description):
+            return self._by_elimination(self.method, T, values)
+        free = np.stack([np.zeros(values.shape), values], axis=-1)
+        found = solve_in_closed_form(self.description, self.method, T, free, threads=threads)
+        # Another value may have a solution.
+        status = np.where(
+            found.status_code == IKStatus.out_of_reach, IKStatus.not_found, found.status_code
+        )
+        return replace(
+            found, status_code=status.astype(np.uint8), complete=False, redundancy=values
+        )
+
+    def _by_elimination(self, six: Description, T: Array, values: Array) -> IKSolutions:
+        """Return the solutions of the arm without joint 7, for the poses before joint 7 moves the tool."""
+        axes = Axes.of(self.description)
+        # T = E_1 ... E_6 E_7 T_0, so that E_1 ... E_6 T_0 = T (T_0^-1 E_7^-1 T_0).
+        T_0 = axes.T_world_tool
+        back = (
+            inverse_pose(T_0) @ _turned(axes.direction(JOINTS), axes.point(JOINTS), -values) @ T_0
+        )
+        found = solve_by_elimination(six, T @ back)
+
+        B = len(found.branches)
+        # In (-pi, pi], as the other joints.
+        last = np.pi - np.mod(np.pi - values, 2 * np.pi)
+        last = np.broadcast_to(last[..., None], (*values.shape, B))
+        q = np.concatenate([found.q, np.where(found.valid, last, np.nan)[..., None]], axis=-1)
+        return collect(
+            self.description,
+            q,
+            found.distance,
+            positions=T[..., :3, 3],
+            posed=found.status_code != IKStatus.not_a_pose,
+            branches=found.branches,
+            met=found.met,
+            complete=False,
+            redundancy=values,
+        )
+
+
+def _asked_for(
+    description: Description,
+    seed: ArrayLike | None,
+    redundancy: ArrayLike | None,
+    batch: tuple[int, ...],
+) -> Array | None:
+    """Return the redundancies that a caller asks for, shape ``batch``; None if any will do."""
+    if redundancy is not None:
+        given = np.asarray(redundancy, dtype=float)
+        name = "redundancy"
+        expected = f"() or {batch}"
+    elif seed is not None:
+        start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
+        given = redundancy_of(description, joint_array(description, start, "seed"))
+        name = "seed"
+        expected = f"({JOINTS},) or {(*batch, JOINTS)}"
+    else:
+        return None
+    try:
+        values = np.broadcast_to(given, batch)
+    except ValueError:
+        shape = given.shape if redundancy is not None else (*given.shape, JOINTS)
+        raise ValueError(f"{name} has shape {shape}; expected {expected}") from None
+    if not np.isfinite(values).all():
+        raise ValueError(f"{name} is not finite; expected rad")
+    return values
+
+
+def _at_tried_values(solver: _AtRedundancy, T: Array, threads: int) -> IKSolutions:
+    """Return each pose's solutions at a value with some inside the limits, or else with some at all."""
+    batch = T.shape[:-2]
+    poses = T.reshape(-1, 4, 4)
+    tried = _values_to_try(solver.description)
+    first = solver(T, np.full(batch, tried[0]), threads)
+    has_some = first.valid.any(axis=-1).ravel()
+    posed = first.status_code.ravel() != IKStatus.not_a_pose
+    waiting = np.flatnonzero(~first.allowed.any(axis=-1).ravel() & posed)
+    if not len(waiting):
+        return first
+    chosen = np.full(len(poses), tried[0])
+    for value in tried[1:]:
+        found = solver(poses[waiting], np.full(len(waiting), value), threads)
+        is_allowed = found.allowed.any(axis=-1)
+        is_first = found.valid.any(axis=-1) & ~has_some[waiting]
+        better = waiting[is_allowed | is_first]
+        chosen[better] = value
+        has_some[better] = True
+        waiting = waiting[~is_allowed]
+        if not len(waiting):
+            break
+    else:
+        _choose_by_iteration(solver.description, poses, chosen, waiting, has_some)
+    return solver(T, chosen.reshape(batch), threads)
+
+
+def _choose_by_iteration(
+    description: Description,
+    poses: Array,
+    chosen: Array,
+    waiting: NDArray[np.intp],
+    has_some: NDArray[np.bool_],
+) -> None:
+    """Set ``chosen`` for poses whose solutions lie between the tried values, from solutions by iteration."""
+    for limits in (True, False):
+        if not limits:
+            waiting = waiting[~has_some[waiting]]
+        if not len(waiting):
+            return
+        found = solve_numerically(description, poses[waiting], limits=limits)
+        is_found = found.valid[:, 0]
+        chosen[waiting[is_found]] = redundancy_of(description, found.q[is_found, 0])
+        has_some[waiting[is_found]] = True
+        waiting = waiting[~is_found]
+
+
+def _values_to_try(description: Description) -> Array:
+    """Return redundancies from the middle outward, shape (33,), rad."""
+    found = classify(description).redundant
+    numbers = description.numbers
+    lower, upper = numbers.lower[_LAST], numbers.upper[_LAST]
+    is_joint = found is None or found[0].redundancy == _LAST_JOINT
+    if not (is_joint and np.isfinite(lower) and np.isfinite(upper)):
+        lower, upper = _WHOLE_TURN
+    values = np.linspace(lower, upper, _TRIED + 1)
+    middle = (lower + upper) / 2
+    order = np.argsort(np.abs(values - middle), kind="stable")
+    return np.asarray(values[order])
+
+
+def _turned(direction: Array, point: Array, angle: Array) -> Array:
+    """Return the motions that turn about an axis by angles (...), shape (..., 4, 4).
+
+    A point x moves to p + R (x - p), R = n n^T + cos (1 - n n^T) + sin [n].
+    """
+    along = np.outer(direction, direction)
+    x, y, z = direction
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    c = np.cos(angle)[..., None, None]
+    s = np.sin(angle)[..., None, None]
+    R = along + c * (np.eye(3) - along) + s * across
+    motion = np.zeros((*np.shape(angle), 4, 4))
+    motion[..., :3, :3] = R
+    motion[..., :3, 3] = point - R @ point
+    motion[..., 3, 3] = 1.0
+    return motion

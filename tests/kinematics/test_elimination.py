@@ -1,0 +1,220 @@
+"""Laws of inverse kinematics by elimination: what is returned closes, nothing is missed, the status is honest."""
+
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+
+import acceptance
+from arms_without_closed_form import GENERAL, SIX
+from dhkit import Arm
+from dhkit.description import from_dh, pose, with_base, with_tool
+from dhkit.errors import ModelError
+from dhkit.kinematics import classify, inverse_kinematics, solve_numerically
+from dhkit.kinematics.eliminated import SAME_ANGLE, solve_by_elimination
+from ssik_peer import solutions_of
+
+CLOSES = 1e-12  # share of the reach and rad, away from singularities
+REGULAR = 1e-3
+"""Smallest singular value of the Jacobian at states that count as regular."""
+ALL = {**SIX, **GENERAL}
+
+
+def distance(found, q):
+    """Return how far the nearest solution is from joint values (N, n), rad, shape (N,)."""
+    apart = np.abs(np.angle(np.exp(1j * (found.q - q[:, None])))).max(axis=-1)
+    return np.where(np.isnan(apart), np.pi, apart).min(axis=-1)
+
+
+def regularity(arm, q):
+    return np.linalg.svd(arm.jacobian(q), compute_uv=False)[..., -1]
+
+
+def closure(arm, found, T):
+    errors = np.abs(arm.fk(np.where(found.valid[..., None], found.q, 0.0)) - T[:, None])
+    return errors.max(axis=(2, 3), where=found.valid[..., None, None], initial=0.0).max()
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_joint_values_that_made_a_pose_are_found(name, law):
+    arm = ALL[name]
+    count = law.samples(1_000_000 if name in SIX else 100_000) // 100
+    for k in range(100 if acceptance.ACCEPTING else 1):
+        q = np.random.default_rng(k).uniform(-np.pi, np.pi, (count, 6))
+        T = arm.fk(q)
+        found = arm.ik(T)
+        away = distance(found, q)
+        regular = regularity(arm, q) > REGULAR
+        law.holds("regular states missed", int(np.sum(away[regular] > 1e-6)), 0, name)
+        law.holds("poses without a solution", int(np.sum(~found.valid.any(axis=1))), 0, name)
+        law.holds("closure by the reach", closure(arm, found, T) / arm.description.reach, 1e-10)
+        angles = found.q[found.valid]
+        assert np.all((angles > -np.pi) & (angles <= np.pi))
+        assert np.isnan(found.q[~found.valid]).all()
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_solutions_are_different_and_in_order(name, law):
+    arm = ALL[name]
+    q = np.random.default_rng(5).uniform(-np.pi, np.pi, (law.samples(2000), 6))
+    found = arm.ik(arm.fk(q))
+    assert found.branches == tuple(f"solution {k + 1}" for k in range(found.q.shape[-2]))
+    counts = found.valid.sum(axis=1)
+    assert max(1, counts.max()) == len(found.branches) <= 16
+    assert np.array_equal(found.valid, np.arange(len(found.branches)) < counts[:, None])
+    first = np.where(found.valid, found.q[..., 0], 2 * np.pi)
+    assert np.all(np.diff(first, axis=1) > -2 * SAME_ANGLE)
+    between = np.abs(np.exp(1j * found.q[:, :, None]) - np.exp(1j * found.q[:, None])).max(axis=-1)
+    twins = np.nan_to_num(between, nan=np.inf) + 9 * np.eye(len(found.branches))
+    assert twins.min() > 1e-6
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_states_at_and_near_singularities(name, law):
+    """Joints at multiples of 45 degrees, and off them by 1e-16 to 0.1 rad: stretched, folded and aligned axes."""
+    arm = ALL[name]
+    rng = np.random.default_rng(1)
+    count = law.samples(20_000, 300)
+    grid = rng.integers(-4, 5, (count, 6)) * (np.pi / 4)
+    q = grid + rng.normal(0, 1, grid.shape) * 10.0 ** rng.uniform(-16, -1, (count, 1))
+    T = arm.fk(q)
+    found = arm.ik(T)
+    away = distance(found, q)
+    regular = regularity(arm, q) > 2e-2
+    law.holds("regular states missed in 10,000", 1e4 * np.mean(away[regular] > 1e-5), 5, name)
+    law.holds("poses without a solution, share", np.mean(~found.valid.any(axis=1)), 2e-3, name)
+    law.holds("closure by the reach", closure(arm, found, T) / arm.description.reach, 1e-9)
+
+
+@pytest.mark.parametrize("name", ["FANUC CRX-10iA", "general"])
+def test_iteration_from_many_starts_finds_no_other_solution(name, law):
+    arm = ALL[name]
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-np.pi, np.pi, (law.samples(500, 20), 6))
+    T = arm.fk(q)
+    ours = arm.ik(T)
+    assert ours.complete
+    for _ in range(20):
+        starts = rng.uniform(-np.pi, np.pi, q.shape)
+        found = solve_numerically(arm.description, T, starts, restarts=0, limits=False)
+        reached = found.valid[:, 0]
+        ends = found.q[reached, 0]
+        apart = np.abs(np.angle(np.exp(1j * (ours.q[reached] - ends[:, None])))).max(axis=-1)
+        assert np.nanmin(apart, axis=1).max() < 1e-5
+
+
+@acceptance.only_accepting
+def test_ssik_finds_no_other_solution(law):
+    pytest.importorskip("ssik")
+    arm = SIX["UFACTORY xArm 6"]
+    q = np.random.default_rng(4).uniform(-np.pi, np.pi, (law.samples(200), 6))
+    T = arm.fk(q)
+    ours = arm.ik(T)
+    for k, theirs in enumerate(solutions_of(arm.description, T)):
+        theirs = theirs[np.abs(arm.fk(theirs) - T[k]).max(axis=(1, 2)) < 1e-8]
+        apart = np.abs(np.angle(np.exp(1j * (ours.q[k][ours.valid[k]][:, None] - theirs))))
+        assert apart.max(axis=-1).min(axis=0).max() < 1e-5
+
+
+def test_base_and_tool_change_nothing():
+    arm = SIX["oblique wrist"]
+    placed = Arm(
+        with_tool(
+            with_base(arm.description, pose((0.1, 0.2, 0.3), euler=(0.3, 0.2, 0.1))),
+            pose((0, 0.1, 0.2), euler=(1, 2, 3)),
+        )
+    )
+    q = np.random.default_rng(2).uniform(-3, 3, (50, 6))
+    assert distance(placed.ik(placed.fk(q)), q).max() < 1e-6
+
+
+def test_poses_that_are_not_reached_or_none():
+    arm = SIX["FANUC CRX-10iA"]
+    T = arm.fk(np.random.default_rng(0).uniform(-2, 2, (5, 6)))
+    T[1, :3, 3] += 5
+    T[2, 0, 0] = np.nan
+    T[3, :3, 3] = 1e300
+    T[4, :3, 3] *= 1.3 / np.linalg.norm(T[4, :3, 3])
+    found = arm.ik(T)
+    assert found.status.tolist()[:4] == ["ok", "out_of_reach", "not_a_pose", "out_of_reach"]
+    # Just beyond reach, where roots are nearly real: nothing is claimed.
+    assert found.status[4] == "not_found"
+    assert np.isnan(found.distance[1:4]).all() and found.distance[0] == 0
+    alone = arm.ik(T[1])
+    assert alone.q.shape == (1, 6) and np.isnan(alone.q).all() and len(alone) == 1
+    assert solve_by_elimination(arm.description, T[:0]).q.shape == (0, 1, 6)
+    shaped = arm.ik(T[:4].reshape(2, 2, 4, 4))
+    whole = arm.ik(T[:4])
+    assert np.array_equal(shaped.q.reshape(whole.q.shape), whole.q, equal_nan=True)
+
+
+def test_four_axes_that_meet_have_a_status():
+    """Axes 3 to 6 meet in one point: solutions are curves, and what is found closes."""
+    rows = [
+        (0, 0, 0.3, -np.pi / 2),
+        (0, 1.0, 0.4, np.pi / 2),
+        (0, 0.65, 0, np.pi / 2),
+        (0, 0, 0, np.pi / 2),
+        (0, 0, 0, np.pi / 2),
+        (0, 0, 0.15, -np.pi / 2),
+    ]
+    arm = Arm.from_dh(rows)
+    T = arm.fk([0.3, 0.4, -0.5, 0.6, 0.7, 0.2])
+    found = arm.ik(T)
+    assert found.valid.any() and not found.complete
+    assert np.abs(arm.fk(found.q[found.valid]) - T).max() < 1e-9
+
+
+@pytest.mark.parametrize("kinds", ["RRRRR", "RRPRRR", "RRRRRRRR"])
+def test_other_arms_are_refused(kinds):
+    arm = from_dh([(0, 0.1 * (k + 1), 0.2, 0.3 * k + 0.1) for k in range(len(kinds))], kinds=kinds)
+    assert classify(arm).family is None
+    with pytest.raises(ModelError, match="no closed form known; ik_numeric solves any arm"):
+        inverse_kinematics(arm, np.eye(4))
+
+
+def test_arguments_that_do_not_fit_are_said():
+    arm = SIX["oblique wrist"].description
+    with pytest.raises(ValueError, match="out is given, but oblique is 6R"):
+        inverse_kinematics(arm, np.eye(4), out=np.zeros((8, 6)))
+    with pytest.raises(ValueError, match=r"T has shape \(3, 3\)"):
+        inverse_kinematics(arm, np.eye(3))
+    with pytest.raises(ValueError, match="redundancy is given, but oblique has 6 joints"):
+        inverse_kinematics(arm, np.eye(4), redundancy=0.1)
+
+
+@pytest.fixture(scope="module")
+def published(tmp_path_factory):
+    """Tables of 929 robots that are sold, from the wheel of ikdh 1.2.0; its files never enter the repository."""
+    yaml = pytest.importorskip("yaml")
+    folder = tmp_path_factory.mktemp("ikdh")
+    download = [sys.executable, "-m", "pip", "download", "--no-deps", "-q", "-d", str(folder)]
+    if subprocess.run([*download, "ikdh==1.2.0"], check=False).returncode:
+        pytest.skip("the wheel of ikdh cannot be downloaded")
+    (wheel,) = folder.glob("*.whl")
+    tables = {}
+    with zipfile.ZipFile(wheel) as archive:
+        for file in sorted(archive.namelist()):
+            if file.endswith(".yaml"):
+                table = yaml.safe_load(archive.read(file))["dh"]
+                tables.setdefault(repr(table), (file, table))
+    return list(tables.values())
+
+
+@acceptance.only_accepting
+def test_every_published_table_is_solved(published, law):
+    assert len(published) == 929
+    for file, table in published:
+        rows = [tuple(str(table[key][i]) for key in ("theta", "d", "a", "alpha")) for i in range(6)]
+        arm = Arm.from_dh(rows, name="published")
+        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (100, 6))
+        T = arm.fk(q)
+        found = arm.ik(T)
+        regular = regularity(arm, q) > REGULAR
+        missed = np.sum(distance(found, q)[regular] > 1e-6)
+        law.holds("regular states missed of published tables", int(missed), 0, file)
+        law.holds(
+            "closure by the reach, tables", closure(arm, found, T) / arm.description.reach, 1e-10
+        )

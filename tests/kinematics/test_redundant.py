@@ -1,0 +1,141 @@
+"""Laws of arms of seven joints: all solutions at a given redundancy, values that are chosen, paths that close."""
+
+import numpy as np
+import pytest
+
+import acceptance
+from arms_without_closed_form import GEN3, SEVEN
+from dhkit import Arm
+from dhkit.kinematics import IKStatus
+from dhkit.kinematics.redundant import redundancy_of
+
+CLOSES = 1e-12
+
+
+def states(count, seed=0):
+    return np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, 7))
+
+
+def distance(found, q):
+    apart = np.abs(np.angle(np.exp(1j * (found.q - q[..., None, :])))).max(axis=-1)
+    return np.where(np.isnan(apart), np.pi, apart).min(axis=-1)
+
+
+def closure(arm, found, T):
+    errors = np.abs(arm.fk(np.where(found.valid[..., None], found.q, 0.0)) - T[..., None, :, :])
+    return errors.max(axis=(-1, -2))[found.valid].max(initial=0.0)
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_all_solutions_at_the_redundancy_of_a_state(name, law):
+    arm = SEVEN[name]
+    for seed in range(10 if acceptance.ACCEPTING else 1):
+        q = states(law.samples(100_000), seed)
+        T = arm.fk(q)
+        found = arm.ik(T, redundancy=redundancy_of(arm.description, q))
+        law.holds(
+            "rad to the joint values that made the pose", distance(found, q).max(), 1e-5, name
+        )
+        law.holds("closure by the reach", closure(arm, found, T) / arm.description.reach, CLOSES)
+        assert not found.complete and found.valid.any(axis=1).all()
+    again = redundancy_of(arm.description, found.q[found.valid])
+    wanted = np.repeat(found.redundancy, found.valid.sum(axis=1))
+    apart = np.abs(np.angle(np.exp(1j * (again - wanted))))
+    # At a singularity of the shoulder or of the arm's line the angle is less certain.
+    assert np.quantile(apart, 0.99) < 1e-9
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_states_at_and_near_singularities(name, law):
+    arm = SEVEN[name]
+    rng = np.random.default_rng(1)
+    count = law.samples(100_000, 2000)
+    grid = rng.integers(-4, 5, (count, 7)) * (np.pi / 4)
+    q = grid + rng.normal(0, 1, grid.shape) * 10.0 ** rng.uniform(-16, -1, (count, 1))
+    T = arm.fk(q)
+    found = arm.ik(T, redundancy=redundancy_of(arm.description, q))
+    law.holds("closure by the reach", closure(arm, found, T) / arm.description.reach, 1e-11, name)
+    law.holds("poses without a solution, share", np.mean(~found.valid.any(axis=1)), 1e-3, name)
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_without_a_redundancy_one_is_chosen_inside_the_limits(name):
+    arm = SEVEN[name]
+    numbers = arm.description.numbers
+    lower, upper = np.maximum(numbers.lower, -np.pi), np.minimum(numbers.upper, np.pi)
+    q = np.random.default_rng(2).uniform(lower, upper, (200, 7))
+    T = arm.fk(q)
+    found = arm.ik(T)
+    assert found.allowed.any(axis=1).mean() > 0.99
+    assert found.valid.any(axis=1).all()
+    assert closure(arm, found, T) < 1e-11
+    alone = arm.ik(T[3])
+    assert np.array_equal(alone.q, found.q[3], equal_nan=True)
+    assert alone.redundancy == found.redundancy[3]
+    seeded = arm.ik(T, seed=q)
+    assert distance(seeded, q).max() < 1e-6
+
+
+def test_names_of_branches_tell_the_signs_of_joints():
+    iiwa = SEVEN["KUKA iiwa 14"]
+    q = states(200, 3)
+    found = iiwa.ik(iiwa.fk(q), seed=q)
+    for k, name in enumerate(found.branches):
+        for word in name.split():
+            joint = int(word[1]) - 1
+            sign = np.sign(found.q[:, k, joint][found.valid[:, k]])
+            assert np.all(sign == (1 if word[2] == "+" else -1))
+    panda = SEVEN["Franka Panda"]
+    found = panda.ik(panda.fk("ready"), seed="ready")
+    assert np.abs(found.branch("q2- q4- front") - panda.configurations["ready"]).max() < 1e-9
+
+
+def test_poses_beyond_reach_and_no_poses():
+    arm = SEVEN["Franka Panda"]
+    T = np.repeat(arm.fk("ready")[None], 3, axis=0)
+    T[1, :3, 3] = (5.0, 0.0, 0.0)
+    T[2, 0, 0] = np.nan
+    for options in ({}, {"redundancy": 0.5}, {"redundancy": [0.5, 0.1, 0.2]}):
+        found = arm.ik(T, **options)
+        assert found.valid.any(axis=1).tolist() == [True, False, False]
+        assert found.status_code[2] == IKStatus.not_a_pose
+
+
+def test_arguments_that_do_not_fit_are_said():
+    arm = SEVEN["Franka Panda"]
+    T = np.repeat(arm.fk("ready")[None], 3, axis=0)
+    with pytest.raises(ValueError, match=r"redundancy has shape \(2,\); expected \(\) or \(3,\)"):
+        arm.ik(T, redundancy=[0.1, 0.2])
+    with pytest.raises(ValueError, match="redundancy is not finite"):
+        arm.ik(T, redundancy=np.nan)
+    with pytest.raises(ValueError, match="out is given, but panda is 7R"):
+        arm.ik(T, out=np.zeros((3, 8, 7)))
+    with pytest.raises(ValueError, match="redundancy is given, but puma560 has 6 joints"):
+        Arm.load("puma560").ik(T, redundancy=0.0)
+
+
+def test_gen3_whose_shoulder_has_offsets_is_solved_by_elimination(law):
+    assert GEN3.family.redundant is None
+    q = np.random.default_rng(1).uniform(-2, 2, (law.samples(1000, 30), 7))
+    T = GEN3.fk(q)
+    found = GEN3.ik(T, redundancy=q[:, 6])
+    assert distance(found, q).max() < 1e-6
+    assert closure(GEN3, found, T) < 1e-11
+    assert np.array_equal(found.redundancy, q[:, 6])
+
+
+@pytest.mark.parametrize("name", ["Franka Panda", "KUKA iiwa 14"])
+def test_a_closed_path_ends_where_it_began(name):
+    arm = SEVEN[name]
+    q0 = np.array([0.1, -0.7, 0.2, -2.2, 0.1, 1.6, 0.8])
+    angle = np.linspace(0, 2 * np.pi, 101)
+    T = np.repeat(arm.fk(q0)[None], 101, axis=0)
+    T[:, 0, 3] += 0.05 * (np.cos(angle) - 1)
+    T[:, 2, 3] += 0.05 * np.sin(angle)
+    path = arm.ik_path(T, q0)
+    assert path.ok and "" not in path.branch
+    assert np.abs(path.q[-1] - path.q[0]).max() < 1e-9
+    assert np.abs(path.q[0] - q0).max() < 1e-9
+    assert np.abs(arm.fk(path.q) - T).max() < 1e-12
+    redundancy = redundancy_of(arm.description, path.q)
+    assert np.ptp(redundancy) < 1e-9
