@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         IKPath,
         IKSolutions,
         Motion,
+        Preference,
         ReferenceAxes,
         Singularities,
         Workspace,
@@ -751,6 +752,7 @@ class Arm:
         out: Array | None = None,
         threads: int = 1,
         redundancy: ArrayLike | None = None,
+        prefer: Preference | None = None,
     ) -> IKSolutions:
         """Return all solutions of fk(q) = T.
 
@@ -771,6 +773,9 @@ class Arm:
             For arms of seven joints, which have infinitely many solutions: the joint value 7, or the arm angle, of
             those that are returned, shape () or (...), rad; see :attr:`family`. Without it and without a seed, a value
             is chosen that allows a solution inside the limits.
+        prefer
+            What that value is chosen for: ``"limits"``, distance from the limits; ``"manipulability"``; or joint values
+            (7,) to be near to.
 
         Returns
         -------
@@ -783,7 +788,7 @@ class Arm:
         ModelError
             The arm has no closed form, and prismatic joints or not six or seven.
         ValueError, TypeError
-            T has not shape (..., 4, 4); ``seed``, ``out`` or ``redundancy`` does not fit.
+            T has not shape (..., 4, 4); ``seed``, ``out``, ``redundancy`` or ``prefer`` does not fit.
 
         Examples
         --------
@@ -799,13 +804,78 @@ class Arm:
         if (
             seed is None
             and redundancy is None
+            and prefer is None
             and threads is _ONE_THREAD
             and (found := self._calls.ik(T, out)) is not None
         ):
             return found
         from dhkit.kinematics import inverse_kinematics
 
-        return inverse_kinematics(self._description, T, seed, out, threads, redundancy)
+        return inverse_kinematics(self._description, T, seed, out, threads, redundancy, prefer)
+
+    def redundancy(self, q: ArrayLike) -> Array:
+        """Return the redundancy of joint values of an arm of seven joints.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., 7), rad, or the name of a configuration.
+
+        Returns
+        -------
+        Array
+            Joint value 7, or the arm angle in (-pi, pi], shape (...), rad: what :meth:`ik` takes as ``redundancy``.
+
+        Raises
+        ------
+        ModelError
+            The arm has prismatic joints, or not seven joints.
+
+        Examples
+        --------
+        >>> arm = Arm.load("panda")
+        >>> float(arm.redundancy("ready"))
+        0.7853981633974483
+        """
+        from dhkit.kinematics import redundancy_of
+
+        return redundancy_of(self._description, q)
+
+    def redundancy_intervals(
+        self, T: ArrayLike, *, limits: bool = True
+    ) -> list[tuple[float, float]]:
+        """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
+
+        See :func:`dhkit.kinematics.redundancy_intervals`.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in the world, shape (4, 4), m.
+        limits
+            Whether all joints must be inside their limits.
+
+        Returns
+        -------
+        list[tuple[float, float]]
+            Beginning and end of each interval, rad, in ascending order.
+
+        Raises
+        ------
+        ModelError
+            The arm has prismatic joints, or not seven joints.
+        ValueError, TypeError
+            T has not shape (4, 4).
+
+        Examples
+        --------
+        >>> arm = Arm.load("panda")
+        >>> [(round(begin, 2), round(end, 2)) for begin, end in arm.redundancy_intervals(arm.fk("ready"))]
+        [(-0.47, 2.04)]
+        """
+        from dhkit.kinematics import redundancy_intervals
+
+        return redundancy_intervals(self._description, T, limits=limits)
 
     def ik_chunks(
         self, T: ArrayLike, size: int = 16_384, seed: ArrayLike | None = None, threads: int = 1

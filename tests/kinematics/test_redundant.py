@@ -139,3 +139,60 @@ def test_a_closed_path_ends_where_it_began(name):
     assert np.abs(arm.fk(path.q) - T).max() < 1e-12
     redundancy = redundancy_of(arm.description, path.q)
     assert np.ptp(redundancy) < 1e-9
+
+
+@pytest.mark.parametrize("name", SEVEN)
+def test_intervals_of_the_redundancy_have_solutions_inside_and_none_at_their_ends(name):
+    arm = SEVEN[name]
+    numbers = arm.description.numbers
+    lower, upper = np.maximum(numbers.lower, -np.pi), np.minimum(numbers.upper, np.pi)
+    rng = np.random.default_rng(4)
+    for q in rng.uniform(lower, upper, (5, 7)):
+        T = arm.fk(q)
+        intervals = arm.redundancy_intervals(T)
+        value = float(arm.redundancy(q))
+        assert any(begin - 1e-6 <= value <= end + 1e-6 for begin, end in intervals)
+        for begin, end in intervals:
+            inside = rng.uniform(begin, end, 20)
+            found = arm.ik(np.repeat(T[None], 20, axis=0), redundancy=inside)
+            assert found.allowed.any(axis=1).all()
+            for beyond in (begin - 1e-6, end + 1e-6):
+                if -np.pi < beyond < np.pi and lower[6] < beyond < upper[6]:
+                    assert not arm.ik(T, redundancy=beyond).allowed.any()
+
+
+def test_a_preference_chooses_the_best_of_the_tried_values():
+    arm = SEVEN["Franka Panda"]
+    numbers = arm.description.numbers
+    q = np.random.default_rng(5).uniform(numbers.lower, numbers.upper, (20, 7))
+    T = arm.fk(q)
+    half = (numbers.upper - numbers.lower) / 2
+
+    def margin(found):
+        inside = found.within_limits()
+        shares = np.minimum(inside - numbers.lower, numbers.upper - inside) / half
+        return np.nan_to_num(shares.min(axis=-1), nan=-1.0).max(axis=-1)
+
+    plain = arm.ik(T)
+    far = arm.ik(T, prefer="limits")
+    assert np.all(margin(far) >= margin(plain) - 1e-12)
+    assert np.mean(margin(far)) > np.mean(margin(plain)) + 0.05
+    free = arm.ik(T, prefer="manipulability")
+
+    def best(found):
+        inside = found.within_limits()
+        measure = arm.manipulability(np.nan_to_num(inside), "whole")
+        return np.where(found.allowed, measure, 0.0).max(axis=-1)
+
+    assert np.all(best(free) >= best(plain) - 1e-12)
+    posture = arm.configurations["ready"]
+    near = arm.ik(T, prefer=posture)
+    gaps = [
+        np.nanmin(np.sum((found.within_limits(posture) - posture) ** 2, axis=-1), axis=-1)
+        for found in (near, plain)
+    ]
+    assert np.all(gaps[0] <= gaps[1] + 1e-12)
+    with pytest.raises(ValueError, match="prefer is 'speed'; expected 'limits', 'manip"):
+        arm.ik(T, prefer="speed")
+    with pytest.raises(ValueError, match="prefer is given with redundancy or seed"):
+        arm.ik(T, prefer="limits", redundancy=0.1)

@@ -19,6 +19,7 @@ from dhkit.kinematics.manipulability import (
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
 from dhkit.kinematics.programs import export_kinematics, kinematic_kernels
+from dhkit.kinematics.redundant import Preference, redundancy_intervals, redundancy_of
 from dhkit.kinematics.singularities import (
     Singularities,
     determinant,
@@ -41,6 +42,7 @@ __all__ = [
     "IKSolutions",
     "IKStatus",
     "Motion",
+    "Preference",
     "ReferenceAxes",
     "Singularities",
     "Workspace",
@@ -62,6 +64,8 @@ __all__ = [
     "kinematic_kernels",
     "manipulability",
     "measures",
+    "redundancy_intervals",
+    "redundancy_of",
     "singular_configurations",
     "singular_values",
     "singularities",

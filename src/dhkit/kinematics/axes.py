@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ class Axes:
     tolerance: float = TOLERANCE
 
     @classmethod
+    @lru_cache(maxsize=512)
     def of(cls, description: Description, tolerance: float = TOLERANCE) -> Axes:
         """Return the axes of an arm."""
         frames = world_to_frames(description, np.zeros(description.n))

@@ -92,7 +92,10 @@ def has_curves(description: Description) -> bool:
 def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
     """Return solutions (K, n) sorted by the poses that they belong to, shape (poses, B, n), filled up with NaN."""
     counts = np.bincount(owner, minlength=poses)
-    order = np.lexsort([*np.rint(q.T / SAME_ANGLE)[::-1], owner])
+    # Angles are rounded, and those of joints 2 and 3 count where the ones before are equal.
+    q_1, q_2, q_3 = np.rint(q[:, :3].T / SAME_ANGLE) * SAME_ANGLE
+    by_joints = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
+    order = np.lexsort([by_joints, owner])
     place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
     table = np.full((poses, max(1, int(counts.max(initial=0))), q.shape[1]), np.nan)
     table[owner[order], place] = q[order]

@@ -13,7 +13,7 @@ from dhkit.errors import ModelError
 from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.eliminated import solve_by_elimination
-from dhkit.kinematics.redundant import JOINTS, solve_redundant
+from dhkit.kinematics.redundant import JOINTS, Preference, solve_redundant
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import free_angles, solve_in_closed_form, solver_of
 
@@ -31,6 +31,7 @@ def inverse_kinematics(
     out: Array | None = None,
     threads: int = 1,
     redundancy: ArrayLike | None = None,
+    prefer: Preference | None = None,
 ) -> IKSolutions:
     """Return all solutions of T_world_tool(q) = T in closed form.
 
@@ -54,8 +55,12 @@ def inverse_kinematics(
     threads
         Number of threads for a large batch. Only for closed forms.
     redundancy
-        Joint position 7 of an arm of seven joints, shape () or (...), rad. Without it and without a seed, values from
-        the middle of its limits outward are tried until one has a solution inside all limits.
+        Redundancy of an arm of seven joints, shape () or (...), rad: joint position 7 or the arm angle. Without it and
+        without a seed, values from the middle outward are tried until one has a solution inside all limits.
+    prefer
+        What the redundancy of an arm of seven joints is chosen for: ``"limits"``, distance from the limits;
+        ``"manipulability"``; or joint positions (7,) to be near to. See
+        :func:`dhkit.kinematics.redundant.solve_redundant`.
 
     Returns
     -------
@@ -68,7 +73,7 @@ def inverse_kinematics(
         No closed form is known for this arm, and it has prismatic joints or not six or seven; says how its axes lie and
         what to use.
     ValueError, TypeError
-        T has not shape (..., 4, 4); ``seed``, ``out`` or ``redundancy`` does not fit.
+        T has not shape (..., 4, 4); ``seed``, ``out``, ``redundancy`` or ``prefer`` does not fit.
 
     Examples
     --------
@@ -84,12 +89,14 @@ def inverse_kinematics(
     check_whole("threads", threads, 1)
     poses = pose_rows(T)
     solver = solver_of(description)
-    if redundancy is not None and description.n != JOINTS:
-        raise ValueError(
-            f"redundancy is given, but {description.name} has {description.n} joints; expected 7"
-        )
+    if description.n != JOINTS:
+        for name, value in (("redundancy", redundancy), ("prefer", prefer)):
+            if value is not None:
+                raise ValueError(
+                    f"{name} is given, but {description.name} has {description.n} joints; expected 7"
+                )
     if solver is None:
-        return _solved_otherwise(description, poses, seed, out, threads, redundancy)
+        return _solved_otherwise(description, poses, seed, out, threads, redundancy, prefer)
     batch = poses.shape[:-2]
     free = free_angles(description, solver.fit, seed, batch)
     found = solve_in_closed_form(description, solver, poses, free, out, threads)
@@ -218,6 +225,7 @@ def _solved_otherwise(
     out: Array | None,
     threads: int,
     redundancy: ArrayLike | None,
+    prefer: Preference | None,
 ) -> IKSolutions:
     """Return the solutions of an arm without a closed form for six joints."""
     found = classify(description)
@@ -230,5 +238,5 @@ def _solved_otherwise(
 
         return solve_from_neighbour(description, T, seed)
     if description.n == JOINTS:
-        return solve_redundant(description, T, seed, redundancy, threads)
+        return solve_redundant(description, T, seed, redundancy, threads, prefer)
     return solve_by_elimination(description, T)

@@ -6,8 +6,10 @@ The redundancy is the arm angle of arms with a spherical shoulder and a spherica
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,19 +18,23 @@ from dhkit.description import (
     Array,
     Description,
     joint_array,
+    joint_vector,
     lock,
+    takes_robot,
     world_to_frames,
     world_to_tool,
 )
 from dhkit.description.frames import carrying, configuration
 from dhkit.description.poses import inverse_pose
 from dhkit.errors import ModelError
+from dhkit.kernels import pose_rows
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import collect
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
 from dhkit.kinematics.eliminated import solve_by_elimination
+from dhkit.kinematics.manipulability import manipulability
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import Solver, solve_in_closed_form, solver_for
@@ -39,6 +45,13 @@ _LAST_JOINT = "joint 7"
 _TRIED = 32
 """Number of steps between the values that are tried where none is asked for."""
 _WHOLE_TURN = (-np.pi, np.pi)
+_PREFERRED_TOGETHER = 256
+"""Poses whose solutions at all tried values are held together, some 4 MB."""
+_STEP = np.pi / 360
+_ACCURACY = 1e-9
+"""Steps in which intervals of the redundancy are looked for, and accuracy of their ends, rad."""
+Preference: TypeAlias = 'Literal["limits", "manipulability"] | ArrayLike'
+"""How a redundancy is chosen."""
 
 
 def solve_redundant(
@@ -47,6 +60,7 @@ def solve_redundant(
     seed: ArrayLike | None = None,
     redundancy: ArrayLike | None = None,
     threads: int = 1,
+    prefer: Preference | None = None,
 ) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T that have a given value of the redundancy.
 
@@ -64,26 +78,33 @@ def solve_redundant(
         solution inside all limits, or that of a solution by iteration, or else the first one with any solution.
     threads
         Number of threads for a large batch of a closed form.
+    prefer
+        How a value is chosen among those that are tried, for the best solution inside the limits: ``"limits"``, the
+        farthest from the limits; ``"manipulability"``, that of :func:`dhkit.kinematics.manipulability` for whole
+        motions; or joint positions (7,), rad, the nearest to them.
 
     Raises
     ------
     ModelError
         The arm has prismatic joints, or not seven joints.
     ValueError, TypeError
-        ``redundancy`` or ``seed`` does not fit, or is not finite.
+        ``redundancy``, ``seed`` or ``prefer`` does not fit, or is not finite; or ``prefer`` is given with another.
     """
-    if description.n != JOINTS or description.numbers.prismatic.any():
-        words = classify(description).words
-        raise ModelError(f"{description.name} is {words}; ik_numeric solves any arm")
+    _check_seven(description)
     batch = T.shape[:-2]
     solver = _AtRedundancy.of(description)
+    if prefer is not None:
+        if redundancy is not None or seed is not None:
+            raise ValueError("prefer is given with redundancy or seed, which leave no choice")
+        return _at_preferred_values(solver, T, _score_of(description, prefer), threads)
     values = _asked_for(description, seed, redundancy, batch)
     if values is None:
         return _at_tried_values(solver, T, threads)
     return solver(T, values, threads)
 
 
-def redundancy_of(description: Description, q: Array) -> Array:
+@takes_robot
+def redundancy_of(description: Description, q: ArrayLike) -> Array:
     """Return the redundancy of joint positions (..., 7), shape (...), rad: the arm angle in (-pi, pi], or joint 7.
 
     Parameters
@@ -97,7 +118,23 @@ def redundancy_of(description: Description, q: Array) -> Array:
     -------
     Array
         Shape (...), rad.
+
+    Raises
+    ------
+    ModelError
+        The arm has prismatic joints, or not seven joints.
+    ValueError, TypeError
+        q has not shape (..., 7), or is not numeric.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> panda = library_robot("panda")
+    >>> float(redundancy_of(panda, [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8]))
+    0.8
     """
+    _check_seven(description)
+    q = joint_array(description, q)
     found = classify(description).redundant
     if found is None or found[0].redundancy == _LAST_JOINT:
         return q[..., _LAST]
@@ -238,6 +275,144 @@ def _at_tried_values(solver: _AtRedundancy, T: Array, threads: int) -> IKSolutio
     else:
         _choose_by_iteration(solver.description, poses, chosen, waiting, has_some)
     return solver(T, chosen.reshape(batch), threads)
+
+
+@dataclass(frozen=True, eq=False)
+class _Score:
+    """How good joint positions are."""
+
+    of: Callable[[Array], Array]
+    """Returns scores (...) of joint positions (..., 7) inside the limits."""
+    near: Array | None = None
+    """Joint positions near to which angles are wound, shape (7,), rad."""
+
+
+def _score_of(description: Description, prefer: Preference) -> _Score:
+    """Return the score that a preference stands for."""
+    numbers = description.numbers
+    if isinstance(prefer, str):
+        if prefer == "limits":
+            return _Score(partial(_share_of_limits, numbers.lower, numbers.upper))
+        if prefer == "manipulability":
+            return _Score(lambda q: manipulability(description, q, "whole"))
+        raise ValueError(
+            f"prefer is {prefer!r}; expected 'limits', 'manipulability' or joint positions"
+        )
+    posture = joint_vector(description, prefer, "prefer")
+    return _Score(lambda q: -np.sum((q - posture) ** 2, axis=-1), posture)
+
+
+def _share_of_limits(lower: Array, upper: Array, q: Array) -> Array:
+    """Return the smallest distance of joint positions (..., 7) from a limit, as a share of half the joint's range."""
+    has_limits = np.isfinite(upper - lower)
+    begin = lower[has_limits]
+    end = upper[has_limits]
+    with_limits = q[..., has_limits]
+    shares = np.minimum(with_limits - begin, end - with_limits) / ((end - begin) / 2)
+    smallest: Array = shares.min(axis=-1, initial=1.0)
+    return smallest
+
+
+def _at_preferred_values(
+    solver: _AtRedundancy, T: Array, score: _Score, threads: int
+) -> IKSolutions:
+    """Return each pose's solutions at the tried value of the best score; where none is allowed, at any with some."""
+    batch = T.shape[:-2]
+    poses = T.reshape(-1, 4, 4)
+    tried = _values_to_try(solver.description)
+    chosen = np.full(len(poses), np.nan)
+    for begin in range(0, len(poses), _PREFERRED_TOGETHER):
+        some = slice(begin, begin + _PREFERRED_TOGETHER)
+        here = poses[some]
+        shape = (len(tried), len(here))
+        found = solver(
+            np.broadcast_to(here, (*shape, 4, 4)), np.broadcast_to(tried[:, None], shape), threads
+        )
+        q = found.within_limits(score.near)
+        is_allowed = found.allowed
+        scores = np.full(is_allowed.shape, -np.inf)
+        scores[is_allowed] = score.of(q[is_allowed])
+        of_value = scores.max(axis=-1)
+        has_one = is_allowed.any(axis=(0, 2))
+        chosen[some] = np.where(has_one, tried[of_value.argmax(axis=0)], np.nan)
+    open_rows = np.flatnonzero(np.isnan(chosen))
+    if len(open_rows):
+        chosen[open_rows] = np.asarray(
+            _at_tried_values(solver, poses[open_rows], threads).redundancy
+        )
+    return solver(T, chosen.reshape(batch), threads)
+
+
+@takes_robot
+def redundancy_intervals(
+    description: Description, T: ArrayLike, *, limits: bool = True
+) -> list[tuple[float, float]]:
+    """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
+
+    They are found at steps of half a degree, and their ends by bisection to 1e-9 rad: an interval that is narrower than
+    a step may be missing.
+
+    Parameters
+    ----------
+    description
+        The robot; seven revolute joints.
+    T
+        Pose of the tool in the world, shape (4, 4), m.
+    limits
+        Whether all joints must be inside their limits.
+
+    Returns
+    -------
+    list[tuple[float, float]]
+        Beginning and end of each interval, rad, in ascending order; of an arm angle in [-pi, pi], where one that goes
+        through pi is in two parts.
+
+    Raises
+    ------
+    ModelError, ValueError, TypeError
+        As for :func:`solve_redundant`; T has not shape (4, 4).
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot, world_to_tool
+    >>> panda = library_robot("panda")
+    >>> T = world_to_tool(panda, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
+    >>> [(round(begin, 3), round(end, 3)) for begin, end in redundancy_intervals(panda, T)]
+    [(-0.466, 2.036)]
+    """
+    pose = pose_rows(T)
+    if pose.ndim != 2:
+        raise ValueError(f"T has shape {pose.shape}; expected (4, 4)")
+    _check_seven(description)
+    solver = _AtRedundancy.of(description)
+
+    def is_reached(values: Array) -> NDArray[np.bool_]:
+        found = solver(np.broadcast_to(pose, (len(values), 4, 4)), values)
+        usable = found.allowed if limits else found.valid
+        return np.asarray(usable.any(axis=-1))
+
+    tried = np.sort(_values_to_try(description))
+    count = int(np.ceil((tried[-1] - tried[0]) / _STEP)) + 1
+    grid = np.linspace(tried[0], tried[-1], count)
+    inside = is_reached(grid)
+    change = np.flatnonzero(inside[1:] != inside[:-1])
+    within = np.where(inside[change], grid[change], grid[change + 1])
+    beyond = np.where(inside[change], grid[change + 1], grid[change])
+    while len(change) and np.abs(within - beyond).max() > _ACCURACY:
+        middle = (within + beyond) / 2
+        reached = is_reached(middle)
+        within = np.where(reached, middle, within)
+        beyond = np.where(reached, beyond, middle)
+
+    ends = [*grid[:1][inside[:1]], *within, *grid[-1:][inside[-1:]]]
+    return [(float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def _check_seven(description: Description) -> None:
+    """Raise ModelError unless the arm has seven revolute joints."""
+    if description.n != JOINTS or description.numbers.prismatic.any():
+        words = classify(description).words
+        raise ModelError(f"{description.name} is {words}; ik_numeric solves any arm")
 
 
 def _choose_by_iteration(

@@ -43,6 +43,8 @@ REDUNDANT = (
     ),
 )
 """Families of arms of seven joints with a closed form at a given value, in the order in which they are tried."""
+_ELIMINATED = {"6R": "", "7R": " at a given joint 7"}
+"""Kinds of arms that are solved without a closed form, see :mod:`dhkit.kinematics.polynomial`."""
 _EXACT_MEMBER = 2e-16
 """Tolerance within which an arm misses a family by rounding alone."""
 _NEAR_MISSES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
@@ -111,7 +113,7 @@ def classify(description: Description) -> Classification:
     >>> classify(library_robot("puma560")).family.name
     'elbow_wrist'
     >>> print(classify(library_robot("jaco")).words)
-    6R: no closed form known
+    6R: no closed form known, solved by elimination
     """
     axes = Axes.of(description)
     kinds = f"{axes.n}R" if set(axes.kinds) == {"R"} else axes.kinds
@@ -136,6 +138,8 @@ def classify(description: Description) -> Classification:
     if near is not None:
         words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?"
         words += " as_designed=True (--as-designed) reads them as right angles)"
+    elif kinds in _ELIMINATED:
+        words += f", solved by elimination{_ELIMINATED[kinds]}"
     meets_all = near is not None and near[1].coordinates == ALL_COORDINATES
     return Classification(words, None, None, near if meets_all else None)
 

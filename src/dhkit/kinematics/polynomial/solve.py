@@ -9,15 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
+from dhkit.kinematics.newton import Newton, closes
 from dhkit.kinematics.numeric import refined
 from dhkit.kinematics.polynomial import trigonometric
 
 _CHUNK = 1_024
 """Poses that are solved together; their arrays take some 10 MB."""
+_CLOSES = 1e-14
+"""Error of starts that need no iteration: share of the reach, and rad."""
 _INEXACT = 1e-6
 """Largest coefficient beyond degree 8, relative to the others, of a polynomial that is trusted."""
 _SAME_SOLUTION = 1e-5
 """Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
+_SPACING = 20.0
+"""Distance of the numbers by which the solutions of two poses are sorted; those of one pose differ by up to 14."""
 _NEIGHBOURS = 4
 """Number of solutions, in the order of a number that is the same for equal ones, that each is compared with."""
 
@@ -86,7 +91,7 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
         of_root, starts = elimination.starts(goals, roots.angle + first[roots.owner])
     is_number = np.isfinite(starts).all(axis=1)
     of_root = of_root[is_number]
-    q, closed = refined(description, starts[is_number], goals[of_root])
+    q, closed = _polished(description, starts[is_number], goals[of_root])
     q, owner = distinct(q[closed], roots.owner[of_root[closed]])
 
     expected = np.bincount(roots.owner[roots.is_real], minlength=len(poses))
@@ -94,19 +99,35 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
     return Found(q, owner, expected, beyond < _INEXACT)
 
 
+def _polished(
+    description: Description, starts: Array, goals: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the ends (K, 6) of Newton's method, and whether they close; starts that close already stay as they are."""
+    newton = Newton.of(description, position_only=False, limits=False)
+    with np.errstate(all="ignore"):
+        closed = closes(newton.error(starts, goals), _CLOSES)
+    rest = np.flatnonzero(~closed)
+    q = starts.copy()
+    q[rest], closed[rest] = refined(description, starts[rest], goals[rest])
+    return q, closed
+
+
 def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
     """Return solutions (K, n), rad, without those that another one of the same pose equals, and their poses (K,).
 
     Poses are in ascending order, the solutions of each in no particular one.
     """
-    # Equal solutions have equal numbers sum_j cos(q_j + j), whole turns included, and so lie next to each other.
-    number = np.cos(q + np.arange(q.shape[1])).sum(axis=1)
-    order = np.lexsort([number, owner])
+    # Equal solutions of a pose have equal numbers, whole turns included, and so lie next to each other.
+    n = q.shape[1]
+    number = np.cos(q + np.arange(n)).sum(axis=1) + _SPACING * owner
+    order = np.argsort(number)
     q = q[order]
     owner = owner[order]
+    number = number[order]
     is_new = np.ones(len(q), dtype=bool)
     for lag in range(1, min(_NEIGHBOURS, len(q) - 1) + 1):
+        near = np.flatnonzero(number[lag:] - number[:-lag] < n * _SAME_SOLUTION)
         # |e^(ia) - e^(ib)| = 2 |sin((a - b) / 2)|, about |a - b|.
-        apart = 2 * np.abs(np.sin((q[lag:] - q[:-lag]) / 2)).max(axis=1)
-        is_new[lag:] &= (apart > _SAME_SOLUTION) | (owner[lag:] != owner[:-lag])
+        apart = 2 * np.abs(np.sin((q[near + lag] - q[near]) / 2)).max(axis=1)
+        is_new[near[apart <= _SAME_SOLUTION] + lag] = False
     return q[is_new], owner[is_new]

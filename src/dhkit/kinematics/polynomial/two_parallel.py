@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dhkit.cached_property import cached_property
 from dhkit.description import Array
 from dhkit.description.poses import inverse_pose
 from dhkit.kernels import Kernel, kernel
@@ -66,7 +67,7 @@ class TwoParallel:
             return cls(chain, (5, 6), axes.scale)
         return None
 
-    @property
+    @cached_property
     def parameters(self) -> Array:
         """The numbers of the programs, shape (49,), lengths as shares of the reach: see :func:`_named`."""
         chain = self.chain
