@@ -224,7 +224,42 @@ def test_an_arm_that_loses_its_closed_form_is_followed_by_iteration(open_lab):
     lab.answer("joints.set", {"q": q.tolist()})
     lab.answer("tool.target", {"T": lab.desk.arm.fk(q).ravel().tolist()})
     target = states(lab)["target"]
-    assert target["numeric"] and target["reached"] and len(target["branches"]) == 1
+    assert target["reached"] and not target["numeric"] and len(target["branches"]) == 8
+    assert any(branch["chosen"] for branch in target["branches"])
+    other = next(b for b in target["branches"] if b["within"] and not b["chosen"])
+    lab.answer("tool.choose", {"branch": other["name"]})
+    assert np.abs(np.angle(np.exp(1j * (lab.desk.q - other["q"])))).max() < 1e-9
+
+
+def test_an_arm_of_seven_joints_keeps_its_redundancy_and_is_moved_by_it(open_lab):
+    lab = open_lab("panda")
+    q = np.array([0.1, -0.6, 0.2, -2.1, 0.1, 1.6, 0.8])
+    lab.answer("joints.set", {"q": q.tolist()})
+    T = lab.desk.arm.fk(q)
+    lab.answer("tool.target", {"T": T.ravel().tolist()})
+    target = states(lab)["target"]
+    assert target["reached"] and not target["numeric"] and np.abs(lab.desk.q - q).max() < 1e-9
+    redundancy = target["redundancy"]
+    assert (redundancy["name"], round(redundancy["value"], 9)) == ("joint 7", 0.8)
+    numbers = lab.desk.arm.description.numbers
+    assert (redundancy["lower"], redundancy["upper"]) == (numbers.lower[6], numbers.upper[6])
+
+    intervals = lab.answer("tool.intervals", {})["intervals"]
+    assert any(begin < 0.8 < end for begin, end in intervals)
+    lab.answer("tool.redundancy", {"value": 0.5})
+    assert abs(lab.desk.q[6] - 0.5) < 1e-9
+    assert np.abs(lab.desk.arm.fk(lab.desk.q) - T).max() < 1e-9
+    moved = T.copy()
+    moved[0, 3] += 0.01
+    lab.answer("tool.target", {"T": moved.ravel().tolist()})
+    assert abs(lab.desk.q[6] - 0.5) < 1e-9
+
+    # Where it leads out of the limits, the nearest state that they allow is taken.
+    lab.answer("tool.redundancy", {"value": float(numbers.upper[6])})
+    assert states(lab)["target"]["reached"]
+    assert np.abs(lab.desk.arm.fk(lab.desk.q) - moved).max() < 1e-9
+    with pytest.raises(ValueError, match="expected one first"):
+        open_lab("panda").answer("tool.redundancy", {"value": 0})
 
 
 @pytest.mark.parametrize("name", ["puma560", "planar2r", slow_if(True, "stanford")])

@@ -435,17 +435,28 @@ def _choose_by_iteration(
         waiting = waiting[~is_found]
 
 
-def _values_to_try(description: Description) -> Array:
-    """Return redundancies from the middle outward, shape (33,), rad."""
+def redundancy_range(description: Description) -> tuple[float, float]:
+    """Return the range of the redundancy, rad: the limits of joint 7, or -pi and pi.
+
+    Parameters
+    ----------
+    description
+        The robot; seven revolute joints.
+    """
     found = classify(description).redundant
     numbers = description.numbers
-    lower, upper = numbers.lower[_LAST], numbers.upper[_LAST]
+    lower = float(numbers.lower[_LAST])
+    upper = float(numbers.upper[_LAST])
     is_joint = found is None or found[0].redundancy == _LAST_JOINT
-    if not (is_joint and np.isfinite(lower) and np.isfinite(upper)):
-        lower, upper = _WHOLE_TURN
+    has_limits = is_joint and np.isfinite(lower) and np.isfinite(upper)
+    return (lower, upper) if has_limits else _WHOLE_TURN
+
+
+def _values_to_try(description: Description) -> Array:
+    """Return redundancies from the middle outward, shape (33,), rad."""
+    lower, upper = redundancy_range(description)
     values = np.linspace(lower, upper, _TRIED + 1)
-    middle = (lower + upper) / 2
-    order = np.argsort(np.abs(values - middle), kind="stable")
+    order = np.argsort(np.abs(values - (lower + upper) / 2), kind="stable")
     return np.asarray(values[order])
 
 

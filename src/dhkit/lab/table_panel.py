@@ -12,6 +12,7 @@ from dhkit.description import Array, Convention, Description, pose_parts, to_tom
 from dhkit.description.table_rows import quantity
 from dhkit.errors import DhkitError
 from dhkit.kinematics import classify
+from dhkit.kinematics.polynomial.six_joints import has_two_parallel
 from dhkit.lab.desk import Desk
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.viewer.interactive import COLUMNS, table_texts
@@ -222,7 +223,8 @@ class TablePanel(Panel):
     def _note(self) -> str | None:
         first_fit, fit = (classify(table.description).fit for table in (self._first, self._table))
         if first_fit is not None and fit is None:
-            return "this table has no closed form: the tool is followed by iteration"
+            by = "elimination" if has_two_parallel(self._table.description) else "iteration"
+            return f"this table has no closed form: the tool is followed by {by}"
         if self._first.has_shapes and not self._table.has_shapes:
             return "drawn from the table: the arm's meshes fit its own lengths alone"
         return None

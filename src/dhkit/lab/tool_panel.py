@@ -11,12 +11,15 @@ from dhkit.arm import Arm
 from dhkit.description import Array, pose
 from dhkit.errors import DhkitError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
-from dhkit.kinematics.polynomial.six_joints import six_joints
+from dhkit.kinematics.polynomial.six_joints import has_two_parallel
+from dhkit.kinematics.redundant import redundancy_range
 from dhkit.lab.desk import Desk
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 
 MAX_DISTANCE = 1e4
 """Largest coordinate of a target, m."""
+MAX_REDUNDANCY = 10.0
+"""Largest redundancy that a page asks for, rad."""
 MAX_RESTARTS = 3
 """Restarts of the iterative solver for arms without closed form, while a person drags the target."""
 ROTATION_TOLERANCE = 1e-6
@@ -102,10 +105,8 @@ class ToolPanel(Panel):
         name = fields.text("branch")
         if self.T is None:
             raise ValueError("tool.choose: there is no target; expected one first")
-        branches = {
-            branch.name: branch
-            for branch in self._branches(*solve_pose(self.desk.arm, self.T, self.desk.q))
-        }
+        solutions, by_iteration = solve_pose(self.desk.arm, self.T, self.desk.q)
+        branches = {branch.name: branch for branch in self._branches(solutions, by_iteration)}
         if name not in branches:
             raise ValueError(
                 f"tool.choose: found {name[:40]!r}; expected a branch that reaches the target"
@@ -113,7 +114,25 @@ class ToolPanel(Panel):
         if not branches[name].within_limits:
             raise ValueError(f"tool.choose: {name} is outside the joint limits, and only shown")
         self.chosen = name
-        return self._follow(self.T)
+        return self._follow(self.T, branches[name].q)
+
+    @answers("tool.redundancy", "value")
+    def set_redundancy(self, fields: Fields) -> JsonObject:
+        """Move an arm of seven joints without its tool: to joint 7, or the arm angle."""
+        value = fields.number("value", -MAX_REDUNDANCY, MAX_REDUNDANCY)
+        if self.T is None:
+            raise ValueError("tool.redundancy: there is no target; expected one first")
+        if classify(self.desk.arm.description).redundant is None:
+            raise ValueError("tool.redundancy: the arm has none; expected an arm of seven joints")
+        return self._follow(self.T, redundancy=value)
+
+    @answers("tool.intervals")
+    def intervals(self, _: Fields) -> JsonObject:
+        """Return the intervals of the redundancy in which the target is reached inside the limits."""
+        redundant = classify(self.desk.arm.description).redundant
+        if self.T is None or redundant is None:
+            return {"intervals": []}
+        return {"intervals": self.desk.arm.redundancy_intervals(self.T)}
 
     @answers("tool.order", "order")
     def set_order(self, fields: Fields) -> None:
@@ -152,8 +171,14 @@ class ToolPanel(Panel):
         self.desk.view.ghosts(None)
         self.publish()
 
-    def _follow(self, T: Array) -> JsonObject:
-        """Take a target, shape (4, 4); show the arm at the chosen or nearest branch, and the others as ghosts."""
+    def _follow(
+        self, T: Array, near: Array | None = None, redundancy: float | None = None
+    ) -> JsonObject:
+        """Take a target, shape (4, 4); show the arm at the chosen or nearest branch, and the others as ghosts.
+
+        Unless given, joint values ``near`` to be nearest to, shape (n,), and the redundancy are those of the state on
+        show.
+        """
         if np.abs(T[:3, 3]).max() > MAX_DISTANCE:
             raise ValueError(
                 f"a target at {T[:3, 3].tolist()} m; expected at most {MAX_DISTANCE:g} m away"
@@ -166,9 +191,10 @@ class ToolPanel(Panel):
             T[:3, 3] -= offset * self._plane.normal
         self.T = T
         desk = self.desk
-        solutions, by_iteration = solve_pose(desk.arm, T, desk.q)
+        solutions, by_iteration = solve_pose(desk.arm, T, desk.q, redundancy)
         branches = self._branches(solutions, by_iteration)
-        followed = self._followed_branch([branch for branch in branches if branch.within_limits])
+        usable = [branch for branch in branches if branch.within_limits]
+        followed = self._followed_branch(usable, desk.q if near is None else near)
         if followed is not None:
             self.chosen = followed.name
             desk.target_q = followed.q.copy()
@@ -204,6 +230,7 @@ class ToolPanel(Panel):
                 for b in branches
             ],
             "numeric": by_iteration,
+            "redundancy": _redundancy_state(desk.arm, solutions),
             "snapped": snapped,
         }
         desk.view.panel("target", state)
@@ -220,12 +247,20 @@ class ToolPanel(Panel):
             if solutions.valid[k] and np.isfinite(q[k]).all()
         ]
 
-    def _followed_branch(self, branches: list[Branch]) -> Branch | None:
-        """Return the chosen branch, or else the one nearest to the state on show."""
-        chosen = next((branch for branch in branches if branch.name == self.chosen), None)
-        if chosen is not None or not branches:
-            return chosen
-        return min(branches, key=lambda branch: float(np.sum((branch.q - self.desk.q) ** 2)))
+    def _followed_branch(self, branches: list[Branch], near: Array) -> Branch | None:
+        """Return the chosen branch, or else the one nearest to joint values.
+
+        The numbers of solutions by elimination name no branch: there the nearest one is followed.
+        """
+        found = classify(self.desk.arm.description)
+        has_names = found.closed_form or found.redundant is not None or found.neighbour is not None
+        if has_names:
+            chosen = next((branch for branch in branches if branch.name == self.chosen), None)
+            if chosen is not None:
+                return chosen
+        return min(
+            branches, key=lambda branch: float(np.sum((branch.q - near) ** 2)), default=None
+        )
 
     def _reached_message(
         self, solutions: IKSolutions, followed: Branch, angle: float, by_iteration: bool
@@ -243,7 +278,9 @@ class ToolPanel(Panel):
         return ", ".join(descriptions) or None
 
 
-def solve_pose(arm: Arm, T: Array, near: Array) -> tuple[IKSolutions, bool]:
+def solve_pose(
+    arm: Arm, T: Array, near: Array, redundancy: float | None = None
+) -> tuple[IKSolutions, bool]:
     """Return the solutions at a pose, and whether they were found by iteration.
 
     Parameters
@@ -254,17 +291,30 @@ def solve_pose(arm: Arm, T: Array, near: Array) -> tuple[IKSolutions, bool]:
         The pose of the tool, shape (4, 4), m, world.
     near
         Joint values where the iteration begins, shape (n,), rad and m.
+    redundancy
+        Redundancy of an arm of seven joints, rad; that of ``near`` unless given.
     """
     family = classify(arm.description)
     if family.redundant is not None:
-        # At the redundancy of the joint values before, so that the tool moves and the arm does not swing.
-        found = arm.ik(T, seed=near)
-        return (found if found.valid.any() else arm.ik(T)), False
+        # Kept, so that the arm does not swing; another one where it leads nowhere inside the limits.
+        value = float(arm.redundancy(near)) if redundancy is None else redundancy
+        found = arm.ik(T, redundancy=value)
+        return (found if found.allowed.any() else arm.ik(T, prefer=near)), False
     if family.closed_form or family.neighbour is not None:
         return arm.ik(T), False
-    if arm.description.kinds == "RRRRRR" and six_joints(arm.description).two_parallel is not None:
+    if has_two_parallel(arm.description):
         return arm.ik(T), False
     return arm.ik_numeric(T, near, restarts=MAX_RESTARTS, position_only=arm.n < 6), True
+
+
+def _redundancy_state(arm: Arm, solutions: IKSolutions) -> JsonObject | None:
+    """Return the redundancy that the page has a slider for; None for other arms."""
+    redundant = classify(arm.description).redundant
+    if redundant is None or solutions.redundancy is None:
+        return None
+    lower, upper = redundancy_range(arm.description)
+    value = float(solutions.redundancy)
+    return {"name": redundant[0].redundancy, "value": value, "lower": lower, "upper": upper}
 
 
 def _unreached_message(solutions: IKSolutions, *, outside_limits: bool) -> str:

@@ -161,6 +161,17 @@ def six_joints(description: Description) -> SixJoints:
     return SixJoints(description)
 
 
+def has_two_parallel(description: Description) -> bool:
+    """Return whether an arm is of the kind of :class:`TwoParallel`, whose elimination needs no comparison.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    return description.kinds == "RRRRRR" and six_joints(description).two_parallel is not None
+
+
 def _with(found: Found, rows: NDArray[np.intp], more: Found) -> Found:
     """Return solutions with those of some of the poses, whose indices are ``rows``, added."""
     q, owner = distinct(

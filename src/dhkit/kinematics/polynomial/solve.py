@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -21,8 +22,10 @@ _INEXACT = 1e-6
 """Largest coefficient beyond degree 8, relative to the others, of a polynomial that is trusted."""
 _SAME_SOLUTION = 1e-5
 """Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
-_SPACING = 20.0
-"""Distance of the numbers by which the solutions of two poses are sorted; those of one pose differ by up to 14."""
+_NUMBERED = 3
+"""Number of joints that make the number by which solutions are sorted."""
+_SPACING = 10.0
+"""Distance of the numbers of two poses; those of one pose differ by up to 6."""
 _NEIGHBOURS = 4
 """Number of solutions, in the order of a number that is the same for equal ones, that each is compared with."""
 
@@ -102,14 +105,17 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
 def _polished(
     description: Description, starts: Array, goals: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the ends (K, 6) of Newton's method, and whether they close; starts that close already stay as they are."""
+    """Return the ends (K, 6) of Newton's method, and whether they close; starts that close already stay where they are.
+
+    Angles are in (-pi, pi].
+    """
     newton = Newton.of(description, position_only=False, limits=False)
+    starts = starts - math.tau * np.ceil((starts - math.pi) / math.tau)
     with np.errstate(all="ignore"):
         closed = closes(newton.error(starts, goals), _CLOSES)
     rest = np.flatnonzero(~closed)
-    q = starts.copy()
-    q[rest], closed[rest] = refined(description, starts[rest], goals[rest])
-    return q, closed
+    starts[rest], closed[rest] = refined(description, starts[rest], goals[rest])
+    return starts, closed
 
 
 def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
@@ -118,15 +124,14 @@ def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]
     Poses are in ascending order, the solutions of each in no particular one.
     """
     # Equal solutions of a pose have equal numbers, whole turns included, and so lie next to each other.
-    n = q.shape[1]
-    number = np.cos(q + np.arange(n)).sum(axis=1) + _SPACING * owner
+    number = np.cos(q[:, :_NUMBERED] + np.arange(_NUMBERED)).sum(axis=1) + _SPACING * owner
     order = np.argsort(number)
     q = q[order]
     owner = owner[order]
     number = number[order]
     is_new = np.ones(len(q), dtype=bool)
     for lag in range(1, min(_NEIGHBOURS, len(q) - 1) + 1):
-        near = np.flatnonzero(number[lag:] - number[:-lag] < n * _SAME_SOLUTION)
+        near = np.flatnonzero(number[lag:] - number[:-lag] < _NUMBERED * _SAME_SOLUTION)
         # |e^(ia) - e^(ib)| = 2 |sin((a - b) / 2)|, about |a - b|.
         apart = 2 * np.abs(np.sin((q[near + lag] - q[near]) / 2)).max(axis=1)
         is_new[near[apart <= _SAME_SOLUTION] + lag] = False

@@ -81,21 +81,29 @@ def real_roots(c: NDArray[np.complex128], beyond: Array) -> Roots:
     beyond
         Error of the coefficients, shape (N,).
     """
-    z = _roots(c)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # z = e^(i (angle + i height)).
-        height = np.abs(np.log(np.abs(z)))
-    near = height < _NEARLY_REAL
+    all_roots = _roots(c)
+    square = all_roots.real**2 + all_roots.imag**2
+    near = (square > np.exp(-2 * _NEARLY_REAL)) & (square < np.exp(2 * _NEARLY_REAL))
     owner, _ = np.nonzero(near)
+    z = all_roots[near]
+    # z = e^(i (angle + i height)).
+    height = np.abs(np.log(square[near])) / 2
 
     # f' = sum i k (c_k z^k - conj(c_k) z^-k): an error of f moves a root by that error over f'.
     k = np.arange(1, DEGREE + 1)
-    powers = z[near][:, None] ** k
+    powers = _powers(z)
+    inverse_powers = _powers(1.0 / z)
     of_owner = c[owner, 1:]
-    slope = np.abs(((of_owner * powers - of_owner.conj() / powers) * k).sum(axis=1))
+    slope = np.abs((of_owner * powers - of_owner.conj() * inverse_powers) @ k)
     error = np.maximum(_ERROR_OF_VALUE, beyond[owner])
-    is_real = height[near] * slope < error
-    return Roots(owner, np.angle(z[near]), is_real)
+    return Roots(owner, np.angle(z), height * slope < error)
+
+
+def _powers(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return z, z^2, ..., z^8 of numbers (K,), shape (K, 8)."""
+    repeated = np.broadcast_to(z, (DEGREE, len(z)))
+    powers: NDArray[np.complex128] = np.multiply.accumulate(repeated, axis=0).T
+    return powers
 
 
 def _roots(c: NDArray[np.complex128]) -> NDArray[np.complex128]:

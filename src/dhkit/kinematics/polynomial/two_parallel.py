@@ -137,9 +137,10 @@ class TwoParallel:
         q_1 = angles[:, None]
         _kernel("residuals", self.meeting)(self.parameters, [poses, q_1], [residuals])
         residuals = np.where(np.isfinite(residuals), residuals, np.inf)
-        smallest = residuals.min(axis=1, keepdims=True, initial=np.inf)
-        fits = np.isfinite(residuals) & (residuals <= np.maximum(smallest, _ALSO_FITS))
-        rows, choice = np.nonzero(fits)
+        fits = residuals <= _ALSO_FITS
+        best = residuals.argmin(axis=1)
+        fits[np.arange(len(poses)), best] = True
+        rows, choice = np.nonzero(fits & np.isfinite(residuals))
 
         q = np.empty((len(rows), 6))
         signs = np.array(SIGNS)[choice]

@@ -7,7 +7,8 @@ import numpy as np
 from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element
 
-_INSTEAD = "use arm.ik, which needs six or seven revolute joints, or arm.ik_numeric"
+_ANY_ARM = "use arm.ik_numeric"
+_SIX_OR_SEVEN = "use arm.ik, which finds its solutions without, or arm.ik_numeric"
 
 
 def why_not(chain: ExactChain) -> str:
@@ -15,7 +16,8 @@ def why_not(chain: ExactChain) -> str:
     n = chain.n
     kinds = chain.description.kinds
     count = f"{n}R" if set(kinds) == {"R"} else kinds
-    return f"no closed form is known for these {count} axes: {_missing(chain)}; {_INSTEAD}"
+    instead = _SIX_OR_SEVEN if count in ("6R", "7R") else _ANY_ARM
+    return f"no closed form is known for these {count} axes: {_missing(chain)}; {instead}"
 
 
 def _missing(chain: ExactChain) -> str:
