@@ -515,6 +515,29 @@ def test_the_solutions_of_few_poses_are_those_of_each(name):
             assert np.array_equal(getattr(few, field)[k], getattr(one, field), equal_nan=True)
 
 
+def test_the_solutions_at_a_redundancy_are_those_of_the_ordinary_way(law):
+    arm = compiled_robot("panda")
+    rng = np.random.default_rng(7)
+    taken = 0
+    for T in poses(arm, rng, law.samples(2000, quick=40)):
+        redundancy = float(rng.uniform(-3.0, 3.0))
+        expected = kinematics.inverse_kinematics(arm, T, redundancy=redundancy)
+        found = arm.ik(T, redundancy=redundancy)
+        taken += "_packed" in vars(found)
+        assert not found.complete and found.branches == expected.branches
+        assert np.array_equal(found.redundancy, expected.redundancy)
+        for field in ("q", "distance"):
+            one = getattr(found, field)
+            other = getattr(expected, field)
+            assert np.allclose(one, other, rtol=0, atol=1e-7, equal_nan=True), field
+        assert np.array_equal(found.status, expected.status)
+    assert taken > 20
+    with pytest.raises(ValueError, match="redundancy is not finite"):
+        arm.ik(arm.fk("ready"), redundancy=float("nan"))
+    with pytest.raises(ValueError, match="could not convert|redundancy"):
+        arm.ik(arm.fk("ready"), redundancy="much")
+
+
 def test_solutions_of_one_pose_are_copied_pickled_and_replaced(puma):
     T = puma.fk(np.linspace(-1, 1, 6))
     expected = puma.ik(T).valid

@@ -809,6 +809,11 @@ class Arm:
             and (found := self._calls.ik(T, out)) is not None
         ):
             return found
+        is_at_redundancy = redundancy is not None and seed is None and out is None
+        if is_at_redundancy and prefer is None and threads is _ONE_THREAD:
+            found = self._calls.ik_at_redundancy(T, redundancy)
+            if found is not None:
+                return found
         from dhkit.kinematics import inverse_kinematics
 
         return inverse_kinematics(self._description, T, seed, out, threads, redundancy, prefer)

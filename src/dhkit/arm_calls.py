@@ -15,7 +15,7 @@ from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
 from dhkit.kinematics.numeric_call import NumericCall, numeric_call
-from dhkit.kinematics.pose_call import PoseCall, pose_call
+from dhkit.kinematics.pose_call import PoseCall, RedundantCall, pose_call, redundant_call
 from dhkit.kinematics.solutions import IKSolutions
 
 ArrayCall: TypeAlias = Callable[..., Array | None]
@@ -94,6 +94,7 @@ class ArmCalls:
     inverse_dynamics_derivatives: Callable[..., InverseDynamicsDerivatives | None]
     forward_dynamics_derivatives: Callable[..., ForwardDynamicsDerivatives | None]
     ik: PoseCallLike
+    ik_at_redundancy: PoseCallLike
     ik_numeric: PoseCallLike
 
     def __init__(self, description: Description) -> None:
@@ -104,6 +105,8 @@ class ArmCalls:
         call: FastCall | None
         if name == "ik":
             call = pose_call(self._description)
+        elif name == "ik_at_redundancy":
+            call = redundant_call(self._description)
         elif name == "ik_numeric":
             call = numeric_call(self._description)
         elif name in _QUANTITIES:
@@ -123,6 +126,8 @@ class ArmCalls:
             yield name
         if isinstance(self.ik, PoseCall):
             self.ik.compile()
+        if isinstance(self.ik_at_redundancy, RedundantCall):
+            self.ik_at_redundancy.compile()
         yield "ik"
         if isinstance(self.ik_numeric, NumericCall):
             self.ik_numeric.compile()

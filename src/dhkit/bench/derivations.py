@@ -24,7 +24,7 @@ from dhkit.symbolic.exact.exact_arm import exact_arm
 PEER = "sympy.physics.mechanics LagrangesMethod"
 CASADI = "dhkit, CasADi functions, all of them"
 _EXACT = "dhkit, exact M, C, g, tau in numbers"
-_INERTIAL = "dhkit, exact, all inertial parameters symbols"
+_INERTIAL = "dhkit, exact, with symbols for inertial parameters"
 PROOFS = "dhkit, both proofs of that"
 INVERSE_DYNAMICS = "inverse dynamics"
 FUNCTIONS = (

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
@@ -24,6 +26,8 @@ from dhkit.kinematics.solver import solver_of
 
 _MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
+_FAR = 1e6
+"""Joint value that stands for none, rad or m, farther away than any."""
 _WHOLE = 6
 """Fewest joints of an arm that reaches whole poses."""
 _TOLERANCE = 1e-12
@@ -165,40 +169,44 @@ def _followed_by_branches(
     """Return the path by the solutions of each pose, of which the one nearest to the last is taken."""
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.allowed if limits else solutions.valid
-    jump = _largest_steps(description)
+    at_singularity = solutions.flags & (IKFlag.wrist | IKFlag.shoulder) != 0
+    has_free_joint = np.asarray(at_singularity.any(axis=-1))
+    is_usable = np.asarray(usable.any(axis=-1))
+    near = _NearestBranch.of(solutions, usable, q0, limits)
     q = np.full((len(poses), description.n), np.nan)
-    places = np.full(len(poses), -1)
-    switches = []
-    lost = []
+    branch = [""] * len(poses)
     at = q0
     for k in range(len(poses)):
-        candidates = solutions.q[k]
-        allowed = usable[k]
-        if np.any(solutions.flags[k] & (IKFlag.wrist | IKFlag.shoulder)):
+        if has_free_joint[k]:
             # Where the wrist is straight, or its centre on axis 1, one joint is free and keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
-            candidates = here.q
             allowed = here.allowed if limits else here.valid
-        chosen = _nearest_branch(candidates, allowed, at, solutions, limits)
-        if chosen is None:
-            lost.append(k)
-            continue
-        places[k], q[k] = chosen
+            chosen = _nearest_branch(here.q, allowed, at, solutions, limits)
+        else:
+            chosen = near(k, at) if is_usable[k] else None
+        if chosen is not None:
+            place, at = chosen
+            q[k] = at
+            branch[k] = solutions.branches[place]
+    motion: Motion = "whole" if len(solutions.met) == 6 else "translational"
+    return _path_of(description, q, branch, q0, motion)
 
-        # After a lost pose joints may have moved by more than a step, which is not a jump.
-        if k and lost[-1:] != [k - 1] and np.any(np.abs(q[k] - at) > jump):
-            switches.append(k)
-        at = q[k]
-    reached = q[places >= 0]
+
+def _path_of(
+    description: Description, q: Array, branch: Sequence[str], q0: Array, motion: Motion
+) -> IKPath:
+    """Return a path by its joint values (N, n), NaN where a pose is lost, and the names of its branches."""
+    is_lost = np.isnan(q).any(axis=1)
+    # After a lost pose joints may have moved by more than a step, which is not a jump: the difference is NaN.
+    jumps = (np.abs(np.diff(q, axis=0)) > _largest_steps(description)).any(axis=1)
+    reached = q[~is_lost]
     return IKPath(
         q=q,
-        branch=tuple(solutions.branches[place] if place >= 0 else "" for place in places),
-        switches=tuple(switches),
-        lost=tuple(lost),
+        branch=tuple(branch),
+        switches=tuple((np.flatnonzero(jumps) + 1).tolist()),
+        lost=tuple(np.flatnonzero(is_lost).tolist()),
         start=float(np.abs(reached[0] - q0).max()) if len(reached) else float("nan"),
-        near_singular=_near_singular(
-            description, q, "whole" if len(solutions.met) == 6 else "translational"
-        ),
+        near_singular=_near_singular(description, q, motion),
     )
 
 
@@ -219,36 +227,66 @@ def _followed_by_iteration(
     if limits:
         is_endless = is_endless & np.isinf(numbers.upper - numbers.lower)
     call = numeric_call(description)
-    jump = _largest_steps(description)
     q = np.full((len(poses), description.n), np.nan)
-    switches = []
-    lost: list[int] = []
+    branch = [""] * len(poses)
     at = q0
     for k, T in enumerate(poses):
         found = call(T, at, _TOLERANCE, 0) if limits else None
         if found is None:
             found = solve_numerically(description, T, at, tolerance=_TOLERANCE, limits=limits)
-        if not found.valid[0]:
-            lost.append(k)
-            continue
-        # Angles of joints without limits are in (-pi, pi]: the whole turns of the joints before are added.
-        turns = np.rint((at - found.q[0]) / math.tau)
-        q[k] = found.q[0] + np.where(is_endless, math.tau * turns, 0.0)
+        if found.valid[0]:
+            # Angles of joints without limits are in (-pi, pi]: the whole turns of the joints before are added.
+            turns = np.rint((at - found.q[0]) / math.tau)
+            at = found.q[0] + np.where(is_endless, math.tau * turns, 0.0)
+            q[k] = at
+            branch[k] = "numeric"
+    return _path_of(description, q, branch, q0, "whole")
 
-        # After a lost pose joints may have moved by more than a step, which is not a jump.
-        if k and lost[-1:] != [k - 1] and np.any(np.abs(q[k] - at) > jump):
-            switches.append(k)
-        at = q[k]
-    is_reached = ~np.isnan(q).any(axis=1)
-    reached = q[is_reached]
-    return IKPath(
-        q=q,
-        branch=tuple("numeric" if one else "" for one in is_reached),
-        switches=tuple(switches),
-        lost=tuple(lost),
-        start=float(np.abs(reached[0] - q0).max()) if len(reached) else float("nan"),
-        near_singular=_near_singular(description, q, "whole"),
-    )
+
+@dataclass(frozen=True, eq=False)
+class _NearestBranch:
+    """The nearest branch at each pose of a path."""
+
+    solutions: IKSolutions
+    usable: NDArray[np.bool_]
+    """Shape (N, B)."""
+    limits: bool
+    q: Array | None
+    """Joint values inside the limits, shape (N, B, n); branches that are not usable are far away. None for arms with a
+    joint that has several whole turns inside its limits, whose choice depends on the last pose."""
+    turn: Array
+    """2 pi for joints of which every whole turn is allowed, 0 for others, shape (n,), rad and m."""
+
+    @cached_property
+    def has_turns(self) -> bool:
+        """Whether there is a joint of which every whole turn is allowed."""
+        return bool(self.turn.any())
+
+    @classmethod
+    def of(
+        cls, solutions: IKSolutions, usable: NDArray[np.bool_], q0: Array, limits: bool
+    ) -> _NearestBranch:
+        """Return the branches of a path; ``q0`` are any joint values, shape (n,)."""
+        width = solutions.upper - solutions.lower
+        is_endless = ~solutions.prismatic & (np.isinf(width) if limits else True)
+        has_one_winding = solutions.prismatic | (width < math.tau)
+        turn = np.where(is_endless, math.tau, 0.0)
+        if not np.all(is_endless | has_one_winding):
+            return cls(solutions, usable, limits, None, turn)
+        wound = solutions.wound(solutions.q, q0, limits=limits)
+        return cls(solutions, usable, limits, np.where(usable[..., None], wound, _FAR), turn)
+
+    def __call__(self, k: int, at: Array) -> tuple[int, Array] | None:
+        """Return the branch of pose k that is nearest to joint values (n,), and its joint values."""
+        if self.q is None:
+            return _nearest_branch(
+                self.solutions.q[k], self.usable[k], at, self.solutions, self.limits
+            )
+        step = self.q[k] - at
+        if self.has_turns:
+            step -= self.turn * np.rint(step / math.tau)
+        best = int(np.einsum("bn,bn->b", step, step).argmin())
+        return best, at + step[best]
 
 
 def _nearest_branch(

@@ -10,8 +10,8 @@ from dhkit.description import Array, Description, world_to_tool
 from dhkit.kernels import FastCall, SingleCall
 from dhkit.kernels.call_source import MAX_ITEMS
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.solutions import IKSolutions
-from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_of
+from dhkit.kinematics.solutions import IKSolutions, IKStatus
+from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_for, solver_of
 
 _NO_SEED = np.zeros(2)
 """Angles of free joints without a seed, rad."""
@@ -19,11 +19,14 @@ _ZERO = bytes(8)
 """The distance 0.0 m, with which the packed outputs of a pose that is reached begin."""
 
 
+_REACHED = (IKStatus.ok, IKStatus.singular)
+
+
 class PoseCall:
     """All solutions of one pose or a few of an arm with a closed form, or None of what it does not take."""
 
     def __init__(self, description: Description, solver: Solver) -> None:
-        self._shared = {
+        self.shared = {
             "branches": solver.fit.branches,
             "met": solver.fit.coordinates,
             "description": description,
@@ -35,7 +38,7 @@ class PoseCall:
         # The ordinary way corrects the kernel's distance of poses beyond reach.
         self._needs_reach = has_offset_wrist(solver.fit)
         middle = np.arange(1.0, description.n + 1.0) / description.n
-        self._call: FastCall = SingleCall(
+        self.call: FastCall = SingleCall(
             solver.kernel,
             solver.parameters,
             (B, description.n),
@@ -44,12 +47,12 @@ class PoseCall:
         )
 
     def _install(self, call: FastCall) -> None:
-        self._call = call
+        self.call = call
 
     def compile(self) -> None:
         """Compile the function now."""
-        if isinstance(self._call, SingleCall):
-            self._call.compile()
+        if isinstance(self.call, SingleCall):
+            self.call.compile()
 
     def __call__(self, T: Any, out: Array | None) -> IKSolutions | None:
         """Return the solutions, written into ``out`` unless it is None.
@@ -69,16 +72,50 @@ class PoseCall:
         if self._needs_reach and out is not None and _may_share_memory(T, out):
             # The ordinary way may still need T.
             return None
-        found = self._call(T, no_seed, out)
+        found = self.call(T, no_seed, out)
         if found is None:
             return None
         q, packed = found
-        solutions = IKSolutions.of_packed(q, packed, self._shared)
+        solutions = IKSolutions.of_packed(q, packed, self.shared)
         if self._needs_reach:
             places = range(0, len(packed), self._pose_bytes)
             if not all(packed.startswith(_ZERO, place) for place in places):
                 return None
         return solutions
+
+
+class RedundantCall:
+    """The solutions of one pose of an arm of seven joints at a redundancy, or None of what it does not take."""
+
+    def __init__(self, description: Description, solver: Solver) -> None:
+        self._poses = PoseCall(description, solver)
+        self._shared = {**self._poses.shared, "complete": False}
+
+    def compile(self) -> None:
+        """Compile the function now."""
+        self._poses.compile()
+
+    def __call__(self, T: Any, redundancy: object) -> IKSolutions | None:
+        """Return the solutions.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in the world, shape (4, 4), m.
+        redundancy
+            The redundancy, rad; a float is taken.
+        """
+        if type(redundancy) is not float or type(T) is not np.ndarray or T.ndim != 2:
+            return None
+        found = self._poses.call(T, np.array([0.0, redundancy]), None)
+        # The ordinary way tells a pose that another redundancy may reach from others.
+        if found is None:
+            return None
+        q, packed = found
+        if packed[-1] not in _REACHED:
+            return None
+        shared = {**self._shared, "redundancy": np.array(redundancy)}
+        return IKSolutions.of_packed(q, packed, shared)
 
 
 def _may_share_memory(T: Any, out: Any) -> bool:
@@ -98,3 +135,19 @@ def pose_call(description: Description) -> PoseCall | None:
     if solver is None or classify(description).neighbour is not None:
         return None
     return PoseCall(description, solver)
+
+
+def redundant_call(description: Description) -> RedundantCall | None:
+    """Return the function of an arm of seven joints; None without a closed form at a redundancy.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    redundant = classify(description).redundant
+    return (
+        None
+        if redundant is None
+        else RedundantCall(description, solver_for(description, *redundant))
+    )

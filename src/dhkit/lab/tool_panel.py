@@ -258,9 +258,7 @@ class ToolPanel(Panel):
             chosen = next((branch for branch in branches if branch.name == self.chosen), None)
             if chosen is not None:
                 return chosen
-        return min(
-            branches, key=lambda branch: float(np.sum((branch.q - near) ** 2)), default=None
-        )
+        return min(branches, key=lambda branch: float(np.sum((branch.q - near) ** 2)), default=None)
 
     def _reached_message(
         self, solutions: IKSolutions, followed: Branch, angle: float, by_iteration: bool

@@ -173,7 +173,7 @@ export class Lab {
       body.hidden = i !== k;
       panel.shown?.(i === k);
     });
-    this.panels[k].tab.scrollIntoView({ block: "nearest", inline: "nearest" });
+    showWithin(this.panels[k].tab);
     remember("tab", this.panels[k].name);
   }
 
@@ -344,4 +344,13 @@ export class Lab {
     for (const part of [this.card, this.world, this.dock, ...this.panels.map(({ panel }) => panel)])
       part.unitsChanged?.();
   }
+}
+
+// Scroll the list of a tab to it. scrollIntoView would also scroll a page that has this one in a frame.
+function showWithin(tab) {
+  const list = tab.closest("[role=tablist]");
+  if (!list) return;
+  const [outer, inner] = [list.getBoundingClientRect(), tab.getBoundingClientRect()];
+  list.scrollLeft += Math.max(inner.right - outer.right, 0) + Math.min(inner.left - outer.left, 0);
+  list.scrollTop += Math.max(inner.bottom - outer.bottom, 0) + Math.min(inner.top - outer.top, 0);
 }
