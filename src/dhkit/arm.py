@@ -695,6 +695,56 @@ class Arm:
 
         return jacobian(self._description, q, frame, out, threads)
 
+    def jacobian_derivative(
+        self,
+        q: ArrayLike,
+        frame: ReferenceAxes = "world",
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array:
+        """Return the derivatives of the tool's Jacobian with respect to each joint value, dJ/dq_k.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        frame
+            As for :meth:`jacobian`.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n, 6, n): entry [..., k, :, :] is dJ/dq_k, in the units of J per rad or m.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> q, qd = [0.3, 0.4], np.array([1.0, -1.0])
+        >>> Jd = np.tensordot(qd, arm.jacobian_derivative(q), axes=1)
+        >>> bool(np.allclose(Jd, arm.jacobian_dot(q, qd)))
+        True
+        """
+        is_world = frame == "world"
+        if (
+            threads is _ONE_THREAD
+            and is_world
+            and (dJ := self._calls.jacobian_derivative(q, out)) is not None
+        ):
+            return dJ
+        from dhkit.kinematics import jacobian_derivative
+
+        return jacobian_derivative(self._description, q, frame, out, threads)
+
     def jacobian_dot(
         self,
         q: ArrayLike,
@@ -1208,6 +1258,51 @@ class Arm:
         return self.symbolic.ik.export(folder, language)
 
     # Dynamics
+
+    def mass_matrix_derivative(
+        self, q: ArrayLike, out: Array | None = None, threads: int = 1
+    ) -> Array:
+        """Return the derivatives of the mass matrix with respect to each joint value, dM/dq_k.
+
+        Parameters
+        ----------
+        q
+            Joint values, shape (..., n), rad and m, or the name of a configuration.
+        out
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
+        threads
+            Number of threads that share a large batch.
+
+        Returns
+        -------
+        Array
+            Shape (..., n, n, n): entry [..., k, :, :] is dM/dq_k, in the units of M per rad or m.
+
+        Raises
+        ------
+        DescriptionError
+            A link without a body.
+        ValueError, TypeError
+            An argument of another shape, or not numeric; ``out`` does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> arm = Arm.load("planar2r")
+        >>> q, qd = [0.3, 0.4], np.array([1.0, -1.0])
+        >>> M_dot = np.tensordot(qd, arm.mass_matrix_derivative(q), axes=1)
+        >>> C = arm.coriolis_matrix(q, qd)
+        >>> bool(np.allclose(M_dot, C + C.T))
+        True
+        """
+        if (
+            threads is _ONE_THREAD
+            and (dM := self._calls.mass_matrix_derivative(q, out)) is not None
+        ):
+            return dM
+        from dhkit.dynamics import mass_matrix_derivative
+
+        return mass_matrix_derivative(self._description, q, out, threads)
 
     def mass_matrix(self, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
         """Return the mass matrix M, with the drives' reflected inertia.

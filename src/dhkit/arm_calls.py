@@ -13,7 +13,11 @@ from dhkit.dynamics.regressor import regressor_kernel
 from dhkit.errors import DescriptionError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
-from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
+from dhkit.kinematics.jacobian import (
+    jacobian_derivative_kernel,
+    jacobian_dot_kernel,
+    jacobian_kernel,
+)
 from dhkit.kinematics.numeric_call import NumericCall, numeric_call
 from dhkit.kinematics.pose_call import PoseCall, RedundantCall, pose_call, redundant_call
 from dhkit.kinematics.solutions import IKSolutions
@@ -42,6 +46,10 @@ _QUANTITIES: Mapping[str, _Quantity] = {
     "frames": _Quantity(frames_kernel, lambda n: (n + 1, 4, 4)),
     "jacobian": _Quantity(lambda arm: jacobian_kernel(arm, "world"), lambda n: (6, n)),
     "jacobian_dot": _Quantity(lambda arm: jacobian_dot_kernel(arm, "world"), lambda n: (6, n)),
+    "jacobian_derivative": _Quantity(
+        lambda arm: jacobian_derivative_kernel(arm, "world"), lambda n: (n, 6, n)
+    ),
+    "mass_matrix_derivative": _dynamic("mass_matrix_derivative", lambda n: (n, n, n)),
     "mass_matrix": _dynamic("mass_matrix", lambda n: (n, n)),
     "coriolis_matrix": _dynamic("coriolis_matrix", lambda n: (n, n)),
     "gravity_torque": _dynamic("gravity_torque", lambda n: (n,)),
@@ -84,6 +92,8 @@ class ArmCalls:
     frames: ArrayCall
     jacobian: ArrayCall
     jacobian_dot: ArrayCall
+    jacobian_derivative: ArrayCall
+    mass_matrix_derivative: ArrayCall
     mass_matrix: ArrayCall
     coriolis_matrix: ArrayCall
     gravity_torque: ArrayCall

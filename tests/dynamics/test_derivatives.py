@@ -20,14 +20,17 @@ from dhkit.description import (
     with_tool,
 )
 from dhkit.dynamics import (
+    coriolis_matrix,
     forward_dynamics,
     forward_dynamics_derivatives,
     inertial_parameters,
     inverse_dynamics,
     inverse_dynamics_derivatives,
+    mass_matrix_derivative,
     regressor,
 )
 from dhkit.expressions import exact
+from dhkit.kinematics import jacobian_derivative, jacobian_dot
 from dhkit.model import pinocchio_model
 from dynamics_reference import motions
 from random_arms import random_body, random_drive, tables
@@ -243,3 +246,29 @@ def test_what_is_not_finite_or_singular_gives_nan():
     for function in (inverse_dynamics_derivatives, forward_dynamics_derivatives):
         assert np.isnan(np.array(function(description, np.full(6, np.nan), q, q))).all()
         assert np.isnan(np.array(function(description, q, q, np.full(6, np.inf)))).all()
+
+
+@pytest.mark.parametrize("name", different_robots_first(robots()))
+def test_the_derivative_of_the_mass_matrix_gives_the_coriolis_matrix(name, law):
+    """The Christoffel symbols: C_ij = sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2."""
+    description = library_robot(name)
+    q, qd, _ = motions(description, law.samples(50))
+    dM = mass_matrix_derivative(description, q)
+    by_k = np.einsum("nkij,nk->nij", dM, qd)
+    by_j = np.einsum("njik,nk->nij", dM, qd)
+    by_i = np.einsum("nijk,nk->nij", dM, qd)
+    C = coriolis_matrix(description, q, qd)
+    error = np.abs((by_k + by_j - by_i) / 2 - C).max() / max(1.0, np.abs(C).max())
+    law.holds("Coriolis matrix from dM/dq", error, 1e-12, name)
+    assert np.array_equal(dM[0], mass_matrix_derivative(description, q[0]))
+
+
+@pytest.mark.parametrize("frame", ["world", "tool"])
+@pytest.mark.parametrize("name", different_robots_first(robots()))
+def test_the_derivative_of_the_jacobian_gives_its_rate(name, frame, law):
+    description = library_robot(name)
+    q, qd, _ = motions(description, law.samples(50))
+    rate = np.einsum("nkij,nk->nij", jacobian_derivative(description, q, frame), qd)
+    expected = jacobian_dot(description, q, qd, frame)
+    error = np.abs(rate - expected).max() / max(1.0, np.abs(expected).max())
+    law.holds("rate of the Jacobian from dJ/dq", error, 1e-12, name)

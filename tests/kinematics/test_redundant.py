@@ -108,8 +108,13 @@ def test_arguments_that_do_not_fit_are_said():
         arm.ik(T, redundancy=[0.1, 0.2])
     with pytest.raises(ValueError, match="redundancy is not finite"):
         arm.ik(T, redundancy=np.nan)
-    with pytest.raises(ValueError, match="out is given, but panda is 7R"):
-        arm.ik(T, out=np.zeros((3, 8, 7)))
+    with pytest.raises(ValueError, match="out is given, but gen3 is 7R"):
+        GEN3.ik(T, out=np.zeros((3, 8, 7)), redundancy=0.1)
+    out = np.zeros((3, 8, 7))
+    for options in ({}, {"redundancy": 0.5}, {"prefer": "limits"}, {"seed": "ready"}):
+        found = arm.ik(T, out=out, **options)
+        assert found.q is out
+        assert np.array_equal(out, arm.ik(T, **options).q, equal_nan=True)
     with pytest.raises(ValueError, match="redundancy is given, but puma560 has 6 joints"):
         Arm.load("puma560").ik(T, redundancy=0.0)
 

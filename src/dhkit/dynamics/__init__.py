@@ -13,6 +13,7 @@ from dhkit.dynamics.equations import (
     gravity_torque,
     inverse_dynamics,
     mass_matrix,
+    mass_matrix_derivative,
 )
 from dhkit.dynamics.forward import forward_dynamics, require_inertia
 from dhkit.dynamics.loads import friction_torque, wrench_torque
@@ -43,6 +44,7 @@ __all__ = [
     "inverse_dynamics_derivatives",
     "kinetic_energy",
     "mass_matrix",
+    "mass_matrix_derivative",
     "parameter_grouping",
     "potential_energy",
     "power",

@@ -53,6 +53,42 @@ def mass_matrix(
 
 
 @takes_robot
+def mass_matrix_derivative(
+    description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1
+) -> Array:
+    """Return the derivatives of the mass matrix with respect to each joint value, dM/dq_k.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    q, threads
+        As for :func:`mass_matrix`.
+    out
+        Array that receives the result, shape (..., n, n, n), float64, C-contiguous.
+
+    Returns
+    -------
+    Array
+        Shape (..., n, n, n): entry [..., k, :, :] is dM/dq_k, in the units of M per rad or m.
+
+    Raises
+    ------
+    DescriptionError, ValueError, TypeError
+        As for :func:`mass_matrix`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> mass_matrix_derivative(library_robot("planar2r"), [0.0, 0.5])[1].round(4)
+    array([[-0.1438, -0.0719],
+           [-0.0719,  0.    ]])
+    """
+    n = description.n
+    return evaluate("mass_matrix_derivative", description, {"q": q}, (n, n, n), out, threads)
+
+
+@takes_robot
 def coriolis_matrix(
     description: Description,
     q: ArrayLike,

@@ -20,6 +20,7 @@ from dhkit.symbolic import (
     inertial_pattern,
     joint_symbols,
     kinetic_energy,
+    mass_matrix_derivative,
     potential_energy,
     recursive_bias,
     recursive_forward_dynamics,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 _EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "mass_matrix": composite_mass_matrix,
+    "mass_matrix_derivative": mass_matrix_derivative,
     "coriolis_matrix": composite_coriolis_matrix,
     "gravity_torque": recursive_gravity,
     "bias": recursive_bias,
@@ -47,6 +49,7 @@ _EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
 """Derivations of each quantity, as functions of the table and of the joint vectors of ``_STATES``."""
 _STATES: Mapping[str, tuple[str, ...]] = {
     "mass_matrix": ("q",),
+    "mass_matrix_derivative": ("q",),
     "coriolis_matrix": ("q", "qd"),
     "gravity_torque": ("q",),
     "bias": ("q", "qd"),

@@ -4,7 +4,7 @@ from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
 from dhkit.kinematics.inverse import inverse_kinematics, inverse_kinematics_in_chunks
-from dhkit.kinematics.jacobian import jacobian, jacobian_dot
+from dhkit.kinematics.jacobian import jacobian, jacobian_derivative, jacobian_dot
 from dhkit.kinematics.manipulability import (
     Ellipsoid,
     Motion,
@@ -60,6 +60,7 @@ __all__ = [
     "inverse_kinematics_in_chunks",
     "isotropy",
     "jacobian",
+    "jacobian_derivative",
     "jacobian_dot",
     "kinematic_kernels",
     "manipulability",

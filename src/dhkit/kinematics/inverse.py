@@ -229,6 +229,8 @@ def _solved_otherwise(
 ) -> IKSolutions:
     """Return the solutions of an arm without a closed form for six joints."""
     found = classify(description)
+    if found.redundant is not None:
+        return solve_redundant(description, T, seed, redundancy, threads, prefer, out)
     if out is not None:
         raise ValueError(
             f"out is given, but {description.name} is {found.words}: how many branches there will be is open"

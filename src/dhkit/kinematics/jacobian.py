@@ -12,6 +12,7 @@ from dhkit.symbolic import (
     Graph,
     ReferenceAxes,
     SymbolicTable,
+    derivative_of_matrix,
     jacobian as symbolic_jacobian,
     jacobian_dot as symbolic_jacobian_dot,
     joint_symbols,
@@ -111,6 +112,50 @@ def jacobian_dot(
     return fill(run, parameters, states, (6, description.n), out, threads)
 
 
+@takes_robot
+def jacobian_derivative(
+    description: Description,
+    q: ArrayLike,
+    frame: ReferenceAxes = "world",
+    out: Array | None = None,
+    threads: int = 1,
+) -> Array:
+    """Return the derivatives of :func:`jacobian` with respect to each joint value, dJ/dq_k.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    q
+        Joint positions, shape (..., n), rad and m.
+    frame, threads
+        As for :func:`jacobian`. In ``"tool"`` axes they are the derivatives of the components.
+    out
+        Array for the result, shape (..., n, 6, n), float64, C-contiguous.
+
+    Returns
+    -------
+    Array
+        Shape (..., n, 6, n): entry [..., k, :, :] is dJ/dq_k, in the units of J per rad or m.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As for :func:`jacobian`.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> jacobian_derivative(library_robot("planar2r"), [0.0, 0.0])[1, :2].round(3)
+    array([[-0.4, -0.4],
+           [ 0. ,  0. ]])
+    """
+    _check_frame(frame)
+    run, parameters = jacobian_derivative_kernel(description, frame)
+    n = description.n
+    return fill(run, parameters, [joint_array(description, q)], (n, 6, n), out, threads)
+
+
 @lru_cache(maxsize=1024)
 def jacobian_kernel(description: Description, frame: ReferenceAxes) -> tuple[Kernel, Array]:
     """Return the kernel of :func:`jacobian` and the arm's values of its parameters."""
@@ -124,6 +169,17 @@ def jacobian_dot_kernel(description: Description, frame: ReferenceAxes) -> tuple
     pattern, parameters = table_pattern(description)
     return kernel(
         f"jacobian_dot_{frame}", pattern, lambda: _dot_graph(description, frame)
+    ), parameters
+
+
+@lru_cache(maxsize=1024)
+def jacobian_derivative_kernel(
+    description: Description, frame: ReferenceAxes
+) -> tuple[Kernel, Array]:
+    """Return the kernel of :func:`jacobian_derivative` and the arm's values of its parameters."""
+    pattern, parameters = table_pattern(description)
+    return kernel(
+        f"jacobian_derivative_{frame}", pattern, lambda: _derivative_graph(description, frame)
     ), parameters
 
 
@@ -145,3 +201,10 @@ def _dot_graph(description: Description, frame: ReferenceAxes) -> Graph:
     qd = joint_symbols("qd", description.n)
     J_dot = symbolic_jacobian_dot(table, q, qd, frame)
     return Graph.of("jacobian_dot", {"parameters": parameters, "q": q, "qd": qd}, {"J_dot": J_dot})
+
+
+def _derivative_graph(description: Description, frame: ReferenceAxes) -> Graph:
+    table, parameters = SymbolicTable.parametric(description)
+    q = joint_symbols("q", description.n)
+    slopes = derivative_of_matrix(symbolic_jacobian(table, q, frame), q)
+    return Graph.of("jacobian_derivative", {"parameters": parameters, "q": q}, {"dJ": slopes})

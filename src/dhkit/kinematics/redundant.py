@@ -61,6 +61,7 @@ def solve_redundant(
     redundancy: ArrayLike | None = None,
     threads: int = 1,
     prefer: Preference | None = None,
+    out: Array | None = None,
 ) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T that have a given value of the redundancy.
 
@@ -82,6 +83,8 @@ def solve_redundant(
         How a value is chosen among those that are tried, for the best solution inside the limits: ``"limits"``, the
         farthest from the limits; ``"manipulability"``, that of :func:`dhkit.kinematics.manipulability` for whole
         motions; or joint positions (7,), rad, the nearest to them.
+    out
+        Array for the joint positions, shape (..., 8, 7), float64, contiguous. Only for closed forms.
 
     Raises
     ------
@@ -91,16 +94,22 @@ def solve_redundant(
         ``redundancy``, ``seed`` or ``prefer`` does not fit, or is not finite; or ``prefer`` is given with another.
     """
     _check_seven(description)
-    batch = T.shape[:-2]
     solver = _AtRedundancy.of(description)
+    if out is not None and isinstance(solver.method, Description):
+        words = classify(description).words
+        raise ValueError(
+            f"out is given, but {description.name} is {words}: how many branches there will be is open"
+        )
     if prefer is not None:
         if redundancy is not None or seed is not None:
             raise ValueError("prefer is given with redundancy or seed, which leave no choice")
-        return _at_preferred_values(solver, T, _score_of(description, prefer), threads)
-    values = _asked_for(description, seed, redundancy, batch)
-    if values is None:
-        return _at_tried_values(solver, T, threads)
-    return solver(T, values, threads)
+        values = _preferred_values(solver, T, _score_of(description, prefer), threads)
+        return solver(T, values, threads, out)
+    asked_for = _asked_for(description, seed, redundancy, T.shape[:-2])
+    if asked_for is not None:
+        return solver(T, asked_for, threads, out)
+    found = _at_tried_values(solver, T, threads)
+    return found if out is None else solver(T, np.asarray(found.redundancy), threads, out)
 
 
 @takes_robot
@@ -180,12 +189,14 @@ class _AtRedundancy:
             return cls(description, solver_for(description, *found))
         return cls(description, lock(description, {_LAST: 0}))
 
-    def __call__(self, T: Array, values: Array, threads: int = 1) -> IKSolutions:
-        """Return the solutions of poses (..., 4, 4) at redundancies (...), rad."""
+    def __call__(
+        self, T: Array, values: Array, threads: int = 1, out: Array | None = None
+    ) -> IKSolutions:
+        """Return the solutions of poses (..., 4, 4) at redundancies (...), rad; ``out`` is for closed forms."""
         if isinstance(self.method, Description):
             return self._by_elimination(self.method, T, values)
         free = np.stack([np.zeros(values.shape), values], axis=-1)
-        found = solve_in_closed_form(self.description, self.method, T, free, threads=threads)
+        found = solve_in_closed_form(self.description, self.method, T, free, out, threads)
         # Another value may have a solution.
         status = np.where(
             found.status_code == IKStatus.out_of_reach, IKStatus.not_found, found.status_code
@@ -313,10 +324,8 @@ def _share_of_limits(lower: Array, upper: Array, q: Array) -> Array:
     return smallest
 
 
-def _at_preferred_values(
-    solver: _AtRedundancy, T: Array, score: _Score, threads: int
-) -> IKSolutions:
-    """Return each pose's solutions at the tried value of the best score; where none is allowed, at any with some."""
+def _preferred_values(solver: _AtRedundancy, T: Array, score: _Score, threads: int) -> Array:
+    """Return each pose's tried value of the best score, shape (...); where none is allowed, one with solutions."""
     batch = T.shape[:-2]
     poses = T.reshape(-1, 4, 4)
     tried = _values_to_try(solver.description)
@@ -340,7 +349,7 @@ def _at_preferred_values(
         chosen[open_rows] = np.asarray(
             _at_tried_values(solver, poses[open_rows], threads).redundancy
         )
-    return solver(T, chosen.reshape(batch), threads)
+    return chosen.reshape(batch)
 
 
 @takes_robot

@@ -4,6 +4,8 @@ from .differentiable.composite_bodies import (
     composite_mass_matrix as composite_mass_matrix,
 )
 from .differentiable.derivatives import (
+    derivative_of_matrix as derivative_of_matrix,
+    mass_matrix_derivative as mass_matrix_derivative,
     recursive_forward_dynamics_derivatives as recursive_forward_dynamics_derivatives,
     recursive_inverse_dynamics_derivatives as recursive_inverse_dynamics_derivatives,
 )

@@ -30,6 +30,8 @@ _NEW_ARRAYS = "dhkit"
 SINGLE = "dhkit, one call"
 SINGLE_INTO_OUT = "dhkit, one call, out="
 NEAR = "dhkit, one call, from 0.05 rad"
+GIVEN = "dhkit, out=, redundancy given"
+GIVEN_ONE = "dhkit, one call, redundancy given"
 NEAR_BY = 0.05
 """How far a start of numeric inverse kinematics is from a solution, each joint, rad and m."""
 FEW = (2, 8, 64)
@@ -50,6 +52,8 @@ def contenders() -> tuple[Contender, ...]:
         for name, mode, setup in setups:
             found.append(Contender(name, quantity, mode, setup(quantity), own=True))
     found.append(Contender(NEAR, "ik_numeric", Mode.SINGLE, _from_near, own=True))
+    found.append(Contender(GIVEN, "ik", Mode.BATCH, _given_redundancy, own=True))
+    found.append(Contender(GIVEN_ONE, "ik", Mode.SINGLE, _given_redundancy_one_by_one, own=True))
     return tuple(found)
 
 
@@ -181,6 +185,40 @@ def _from_near(workload: Workload) -> Task:
         one_by_one(function, items),
         lambda count: [_answer("ik_numeric", function(*item)) for item in items[:count]],
     )
+
+
+def _given_redundancy(workload: Workload) -> Task:
+    """Return the task of all solutions at the redundancy of the joint values that made the poses, in a batch."""
+    arm = workload.arm
+    _refuse_all_but_redundant(arm)
+    redundancy = arm.redundancy(workload.q)
+
+    def prepare(items: int) -> Call:
+        T = workload.T[:items]
+        out = np.full_like(arm.ik(T, redundancy=redundancy[:items]).q, np.nan)
+        return lambda: arm.ik(T, out=out, threads=workload.threads, redundancy=redundancy[:items])
+
+    return Task(prepare, lambda k: _answers("ik", prepare(k)()))
+
+
+def _given_redundancy_one_by_one(workload: Workload) -> Task:
+    """Return the task of all solutions of one pose at the redundancy of the joint values that made it."""
+    arm = workload.arm
+    _refuse_all_but_redundant(arm)
+    items = list(zip(workload.T, arm.redundancy(workload.q).tolist(), strict=True))
+
+    def solve(T: Array, redundancy: float) -> Any:
+        return arm.ik(T, redundancy=redundancy)
+
+    return Task(
+        one_by_one(solve, items),
+        lambda count: [_answer("ik", solve(*item)) for item in items[:count]],
+    )
+
+
+def _refuse_all_but_redundant(arm: Arm) -> None:
+    if arm.family.redundant is None:
+        raise UnavailableError("takes arms of seven joints with a closed form at a redundancy")
 
 
 def _refuse_open_form(workload: Workload, quantity: str) -> None:

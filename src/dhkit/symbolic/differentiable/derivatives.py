@@ -57,6 +57,63 @@ def recursive_inverse_dynamics_derivatives(
     return casadi.vertcat(by_position, by_rate, composite_mass_matrix(table, q))
 
 
+def derivative_of_matrix(matrix: casadi.SX, q: casadi.SX) -> casadi.SX:
+    """Return the derivatives of a matrix with respect to each joint value, below each other.
+
+    Parameters
+    ----------
+    matrix
+        r x c.
+    q
+        Symbols of the joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n r x c: d matrix / dq_1, then d matrix / dq_2 ...
+
+    Examples
+    --------
+    >>> import casadi
+    >>> q = casadi.SX.sym("q", 2)
+    >>> derivative_of_matrix(casadi.horzcat(q[0] * q[1], q[1]), q)
+    SX(@1=1,
+    [[q_1, 00],
+     [q_0, @1]])
+    """
+    import casadi
+
+    slopes = casadi.jacobian(casadi.vec(matrix), q)
+    blocks = [casadi.reshape(slopes[:, k], *matrix.shape) for k in range(q.numel())]
+    return casadi.vertcat(*blocks)
+
+
+def mass_matrix_derivative(table: InertialTable, q: casadi.SX) -> casadi.SX:
+    """Return the derivatives of the mass matrix with respect to each joint value, below each other.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Symbols of the joint values, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n n x n: dM/dq_1, then dM/dq_2 ..., per unit of q.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> mass_matrix_derivative(table, joint_symbols("q", 2)).shape
+    (4, 2)
+    """
+    return derivative_of_matrix(composite_mass_matrix(table, q), q)
+
+
 def recursive_forward_dynamics_derivatives(
     table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX
 ) -> casadi.SX:

@@ -1,0 +1,52 @@
+"""frankik (He and Liu 2021): the Panda's and the FR3's solutions at a given joint 7, in C++."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dhkit.bench.contenders import (
+    Contender,
+    Mode,
+    Task,
+    UnavailableError,
+    Workload,
+    import_peer,
+    one_by_one,
+)
+from dhkit.description import Array
+
+_SAME_TOOL = 1e-9
+"""Largest difference of an entry of the tool's transform between states, m."""
+
+
+def contenders() -> tuple[Contender, ...]:
+    """Return frankik's contender; each call takes one pose."""
+    return (Contender("frankik ik_full, joint 7 given", "ik", Mode.SINGLE, _single),)
+
+
+def _single(workload: Workload) -> Task:
+    core = import_peer("frankik")._core
+    poses = workload.T @ _tool(workload, core)
+    starts = workload.q
+    items = list(zip(poses, starts, starts[:, 6].tolist(), strict=True))
+
+    def answers(count: int) -> list[Array]:
+        found = [np.asarray(core.ik_full(*item)) for item in items[:count]]
+        return [q[~np.isnan(q).any(axis=1)] for q in found]
+
+    return Task(one_by_one(core.ik_full, items), answers)
+
+
+def _tool(workload: Workload, core: Any) -> Array:
+    """Return the transform from the arm's tool to frankik's, shape (4, 4)."""
+    if workload.arm.n != 7:
+        raise UnavailableError("takes a Panda or an FR3")
+    q = workload.q[:8]
+    theirs = np.array([core.fk(x) for x in q])
+    transforms = np.linalg.inv(workload.arm.fk(q)) @ theirs
+    if np.abs(transforms - transforms[0]).max() > _SAME_TOOL:
+        raise UnavailableError("takes a Panda or an FR3; this arm moves otherwise")
+    tool: Array = transforms[0]
+    return tool
