@@ -926,7 +926,7 @@ class Arm:
         --------
         >>> arm = Arm.load("panda")
         >>> [(round(begin, 2), round(end, 2)) for begin, end in arm.redundancy_intervals(arm.fk("ready"))]
-        [(-0.47, 2.04)]
+        [(-0.16, 1.73)]
         """
         from dhkit.kinematics import redundancy_intervals
 

@@ -249,6 +249,21 @@ def test_an_arm_without_closed_form_has_an_example_by_iteration():
     assert any(caption.startswith("Solutions of the pose") for caption in captions)
 
 
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("jaco", "the real roots of a polynomial in its angle give 8 solutions"),
+        ("panda", "infinitely many solutions; at joint 7 = 45.00° it has"),
+    ],
+)
+def test_an_arm_without_derivation_has_all_solutions_of_a_pose(name, sentence):
+    blocks = list(inverse_section(library_robot(name), Attachments()))
+    text = " ".join(str(block) for block in blocks)
+    assert sentence in text and "no derivation in closed form" in text
+    table = next(block for block in blocks if isinstance(block, Table))
+    assert len(table.rows) >= 4
+
+
 def test_a_motion_and_a_run_are_shown(tmp_path):
     arm = Arm.load("planar2r")
     motion = arm.quintic([0, 0], [0.5, 0.4], 1.0)

@@ -12,7 +12,7 @@ from dhkit.description.poses import ORTHONORMAL
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions, IKStatus
 
-SINGULARITIES = np.uint8(IKFlag.shoulder | IKFlag.elbow | IKFlag.wrist)
+SINGULARITIES = np.uint8(IKFlag.shoulder | IKFlag.elbow | IKFlag.wrist | IKFlag.singular)
 """Flags of a branch at a singularity."""
 _BOUND_ROUNDING = 1e-12
 """Relative margin of the arm's greatest length for rounding in the sum of its links."""

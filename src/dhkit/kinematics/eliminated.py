@@ -10,12 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
 from dhkit.kernels import pose_rows
+from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
+from dhkit.kinematics.closed_form.formulas import SINGULAR
+from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.solutions import IKSolutions
+from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
 SAME_ANGLE = 1e-6
 """Angles that differ by less, rad, count as equal when solutions are sorted."""
@@ -39,10 +42,10 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     IKSolutions
         Branches ``"solution 1"`` ... ``"solution B"``, B the largest number found for a pose of the batch and at least
         1. They are ordered by their joint values, the first joint's first: the same number at another pose need not
-        be the same way to reach. Singular branches are not flagged. ``complete`` tells whether each pose has as many
-        solutions as its polynomial has real roots; it is False for arms that never move in all directions, whose
-        solutions are curves. A pose that has none of either is ``out_of_reach``, other poses
-        without a solution are ``not_found``. ``distance`` is NaN where nothing was found.
+        be the same way to reach. Singular ones have the flag ``singular``. ``complete`` tells whether each pose has as
+        many solutions as its polynomial has real roots; it is False for arms that never move in all directions, whose
+        solutions are curves. A pose that has none of either is ``out_of_reach``, other poses without a solution are
+        ``not_found``. ``distance`` is NaN where nothing was found.
 
     Raises
     ------
@@ -62,6 +65,9 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     rows = np.flatnonzero(posed)
     table = ordered(found.q, rows[found.owner], posed.size)
     B = table.shape[1]
+    is_delicate = np.zeros(posed.size, dtype=bool)
+    is_delicate[rows] = found.is_delicate
+    flags = _singular_flags(description, table, is_delicate)
     none_exist = np.zeros(posed.size, dtype=bool)
     none_exist[rows] = found.is_complete & (found.counts == 0)
     return collect(
@@ -72,9 +78,24 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
         posed=posed,
         branches=tuple(f"solution {k + 1}" for k in range(B)),
         met=ALL_COORDINATES,
+        flags=flags.reshape(*poses.shape[:-2], B),
         complete=bool(found.is_complete.all()) and not has_curves(description),
         none_exist=none_exist.reshape(posed.shape),
     )
+
+
+def _singular_flags(
+    description: Description, q: Array, is_delicate: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
+    """Return the flags of singular solutions (N, B, n) of delicate poses (N,), shape (N, B)."""
+    flags = np.zeros(q.shape[:2], dtype=np.uint8)
+    is_asked = is_delicate[:, None] & ~np.isnan(q).any(axis=-1)
+    J = jacobian(description, q[is_asked])
+    # Without units: velocities over the reach.
+    J[:, :3] /= Axes.of(description).scale
+    smallest = np.linalg.svd(J, compute_uv=False)[:, -1]
+    flags[is_asked] = np.where(smallest < SINGULAR, np.uint8(IKFlag.singular), np.uint8(0))
+    return flags
 
 
 @lru_cache(maxsize=64)

@@ -387,7 +387,7 @@ def redundancy_intervals(
     >>> panda = library_robot("panda")
     >>> T = world_to_tool(panda, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
     >>> [(round(begin, 3), round(end, 3)) for begin, end in redundancy_intervals(panda, T)]
-    [(-0.466, 2.036)]
+    [(-0.684, 2.254)]
     """
     pose = pose_rows(T)
     if pose.ndim != 2:

@@ -53,6 +53,9 @@ class IKFlag(IntFlag):
     refined = 32
     """Found by Newton's method from a solution of a neighbouring arm, as its own has no closed form: see
     :mod:`dhkit.kinematics.neighbour`."""
+    singular = 64
+    """The smallest singular value of the Jacobian, lengths over the reach, is below 1e-5: of arms without a closed
+    form, whose singularities have no names."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,7 @@ FLAG_DESCRIPTIONS = {
     IKFlag.shoulder: "shoulder singular",
     IKFlag.elbow: "elbow stretched or folded",
     IKFlag.wrist: "wrist singular",
+    IKFlag.singular: "singular",
     IKFlag.clamped: "on the boundary of the workspace",
 }
 

@@ -101,7 +101,8 @@ class SixJoints:
             owner.append(beside.owner[closed])
             expected = np.minimum(expected, beside.expected)
             is_exact &= beside.is_exact
-        return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact)
+        is_delicate = np.ones(len(poses), dtype=bool)
+        return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact, is_delicate)
 
     def _iterated(self, poses: Array, known: Found, rows: NDArray[np.intp]) -> Found:
         """Return what iterations from random starts find, until a round of them finds nothing new.
@@ -137,7 +138,8 @@ class SixJoints:
             waiting = waiting[np.bincount(owner, minlength=len(rows))[waiting] > before[waiting]]
             if not len(waiting):
                 break
-        return Found(q, owner, np.zeros(len(rows), dtype=int), np.zeros(len(rows), dtype=bool))
+        none = np.zeros(len(rows), dtype=np.intp)
+        return Found(q, owner, none, none != 0, none == 0)
 
 
 def _displaced(poses: Array, length: float) -> Iterator[Array]:
@@ -181,4 +183,6 @@ def _with(found: Found, rows: NDArray[np.intp], more: Found) -> Found:
     is_exact = found.is_exact.copy()
     expected[rows] = more.expected
     is_exact[rows] = more.is_exact
-    return Found(q, owner, expected, is_exact)
+    is_delicate = found.is_delicate.copy()
+    is_delicate[rows] = True
+    return Found(q, owner, expected, is_exact, is_delicate)

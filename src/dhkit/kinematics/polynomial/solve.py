@@ -26,6 +26,8 @@ _NUMBERED = 3
 """Number of joints that make the number by which solutions are sorted."""
 _SPACING = 10.0
 """Distance of the numbers of two poses; those of one pose differ by up to 6."""
+_NEAR_ROOTS = 1e-3
+"""Distance of two roots, rad, below which a solution may be singular."""
 _NEIGHBOURS = 4
 """Number of solutions, in the order of a number that is the same for equal ones, that each is compared with."""
 
@@ -55,6 +57,8 @@ class Found:
     """Number of real roots of each pose's polynomial, shape (N,); 1 if there are only some that are nearly real."""
     is_exact: NDArray[np.bool_]
     """Whether the polynomial is known well enough for that number, shape (N,)."""
+    is_delicate: NDArray[np.bool_]
+    """Whether two roots of the polynomial nearly coincide, so that a solution may be singular, shape (N,)."""
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:
@@ -72,7 +76,7 @@ def solve(description: Description, elimination: Elimination, poses: Array) -> F
     q = [np.empty((0, 6))]
     owner = [np.empty(0, dtype=np.intp)]
     expected = np.zeros(len(poses), dtype=np.intp)
-    is_exact = np.zeros(len(poses), dtype=bool)
+    is_exact, is_delicate = np.zeros((2, len(poses)), dtype=bool)
     for begin in range(0, len(poses), _CHUNK):
         some = slice(begin, begin + _CHUNK)
         found = _solve(description, elimination, poses[some])
@@ -80,7 +84,8 @@ def solve(description: Description, elimination: Elimination, poses: Array) -> F
         owner.append(found.owner + begin)
         expected[some] = found.expected
         is_exact[some] = found.is_exact
-    return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact)
+        is_delicate[some] = found.is_delicate
+    return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact, is_delicate)
 
 
 def _solve(description: Description, elimination: Elimination, poses: Array) -> Found:
@@ -99,7 +104,23 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
 
     expected = np.bincount(roots.owner[roots.is_real], minlength=len(poses))
     expected[roots.owner] = np.maximum(expected[roots.owner], 1)
-    return Found(q, owner, expected, beyond < _INEXACT)
+    is_delicate = np.zeros(len(poses), dtype=bool)
+    is_delicate[_with_near_roots(roots)] = True
+    return Found(q, owner, expected, beyond < _INEXACT, is_delicate)
+
+
+def _with_near_roots(roots: trigonometric.Roots) -> NDArray[np.intp]:
+    """Return the indices of polynomials of which two roots nearly coincide, or nearly have an imaginary part."""
+    number = roots.angle + _SPACING * roots.owner
+    order = np.argsort(number)
+    owner = roots.owner[order]
+    are_near = np.diff(number[order]) < _NEAR_ROOTS
+    # The first and the last root of a polynomial may be near to each other through pi.
+    ends = np.flatnonzero(np.diff(owner, prepend=-1, append=-1))
+    begin = ends[:-1]
+    last = ends[1:] - 1
+    through_pi = number[order][last] - number[order][begin] > 2 * np.pi - _NEAR_ROOTS
+    return np.concatenate([owner[1:][are_near], owner[begin][through_pi]])
 
 
 def _polished(

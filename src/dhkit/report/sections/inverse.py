@@ -8,7 +8,7 @@ import numpy as np
 
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.errors import DescriptionError
-from dhkit.kinematics import IKFlag, inverse_kinematics, solve_numerically
+from dhkit.kinematics import IKFlag, IKSolutions, inverse_kinematics, solve_numerically
 from dhkit.kinematics.closed_form import classify
 from dhkit.report.document import Block, Formulas, Heading, Paragraph, Prompt, Table
 from dhkit.report.sections.robot import moved, ready
@@ -34,6 +34,8 @@ from dhkit.symbolic.equations.typst import Math, Row, broken
 from dhkit.symbolic.inverse.steps import DerivationStep
 from dhkit.symbolic.ring import Element
 
+_REDUNDANT = 7
+"""Number of joints of arms with infinitely many solutions, of which those at one redundancy are printed."""
 _STARTS = 24
 """Number of starts of the iteration for an arm without a closed form."""
 _MOST_SOLUTIONS = 8
@@ -44,6 +46,7 @@ _FLAGS = {
     IKFlag.shoulder: "shoulder singular",
     IKFlag.elbow: "elbow stretched or folded",
     IKFlag.wrist: "wrist singular",
+    IKFlag.singular: "singular",
     IKFlag.out_of_limits: "outside the limits",
 }
 
@@ -57,7 +60,11 @@ def inverse_section(description: Description, files: Attachments) -> Iterator[Bl
         derivation = inverse_derivation(description)
     except DescriptionError as error:
         yield Paragraph(f"This arm has no derivation in closed form: {error}.")
-        yield from _iteration(description)
+        all_revolute = set(description.kinds) == {"R"}
+        if all_revolute and description.n in (6, 7):
+            yield from _all_solutions(description)
+        else:
+            yield from _iteration(description)
         yield _prompt()
         return
     is_named = axes.fit is not None and axes.fit.geometry == derivation.geometry
@@ -196,13 +203,7 @@ def _example(derivation: InverseDerivation) -> Iterator[Block]:
     yield Heading("Example", 2)
     yield Paragraph("All branches of the pose")
     yield Formulas((matrix_row(Math("T", "T"), T),))
-    rows = []
-    for k, name in enumerate(result.branches):
-        if result.valid[k]:
-            remarks = [text for flag, text in _FLAGS.items() if result.flags[k] & flag]
-            rows.append(
-                (name or "the only one", *_values(description, result.q[k]), ", ".join(remarks))
-            )
+    rows = list(_branch_rows(result))
     solutions = result.q[result.valid]
     yield _table(description, rows, "Branches of the pose of the example, in ° and m", "branch")
     if len(solutions) and not derivation.family.aims:
@@ -215,6 +216,50 @@ def _example(derivation: InverseDerivation) -> Iterator[Block]:
         yield Paragraph(
             f"Forward kinematics of the {len(solutions)} solutions meets {met} {accuracy}."
         )
+
+
+def _branch_rows(result: IKSolutions) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of the branches that reach one pose: name, joint values and remarks."""
+    for k, name in enumerate(result.branches):
+        if result.valid[k]:
+            remarks = [text for flag, text in _FLAGS.items() if result.flags[k] & flag]
+            values = _values(result.description, result.q[k])
+            yield name or "the only one", *values, ", ".join(remarks)
+
+
+def _all_solutions(description: Description) -> Iterator[Block]:
+    """Yield all solutions of one pose of an arm of six or seven revolute joints without a derivation."""
+    _, q = ready(description)
+    goal = moved(description, q)
+    T = world_to_tool(description, goal)
+    seed = goal if description.n == _REDUNDANT else None
+    result = inverse_kinematics(description, T, seed)
+    error = float(np.abs(world_to_tool(description, result.q[result.valid]) - T).max(initial=0.0))
+    yield Heading("Example", 2)
+    yield Paragraph(f"The pose of the joint values {joint_values(description, goal)} is")
+    yield Formulas((matrix_row(Math("T", "T"), T),))
+    count = int(result.valid.sum())
+    if result.redundancy is None:
+        how = "All joints but one are eliminated, and the real roots of a polynomial in its angle give"
+    else:
+        how = (
+            f"An arm of seven joints has infinitely many solutions; at {_redundancy(result)} it has"
+        )
+    yield Paragraph(f"{how} {count} solutions, which meet the pose to {error:.1e}.")
+    yield _table(
+        description,
+        list(_branch_rows(result)),
+        "Solutions of the pose of the example, in °",
+        "solution",
+    )
+
+
+def _redundancy(result: IKSolutions) -> str:
+    """Return the redundancy of the solutions of one pose in words."""
+    redundant = classify(result.description).redundant
+    name = "joint 7" if redundant is None else redundant[0].redundancy
+    value = float(np.degrees(np.asarray(result.redundancy)))
+    return f"{name} = {value:.2f}°".replace("-", "−")
 
 
 def _iteration(description: Description) -> Iterator[Block]:
