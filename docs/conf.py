@@ -190,7 +190,10 @@ LONGEST_WORD = 36
 
 
 class LongWords(SphinxPostTransform):
-    """Mark inline code that has a word too long for a narrow screen: the style sheet divides no other."""
+    """Mark inline code that has a word too long for a narrow screen: the style sheet divides no other.
+
+    Its text is cut after dots and slashes: each piece becomes an element, before which a line may end.
+    """
 
     default_priority = 7
 
@@ -199,6 +202,9 @@ class LongWords(SphinxPostTransform):
         for literal in self.document.findall(nodes.literal):
             if max(map(len, literal.astext().split()), default=0) > LONGEST_WORD:
                 literal["classes"].append("long")
+                for text in list(literal.findall(nodes.Text)):
+                    pieces = re.split(r"(?<=[./])(?=\w)", text)
+                    text.parent.replace(text, [nodes.Text(piece) for piece in pieces])
 
 
 def full_name(env, node, target: str, objects) -> str | None:
@@ -341,6 +347,12 @@ def default_text(value, **options) -> str:
     return text
 
 
+def without_signature_of_protocols(app, what: str, name: str, value, options, signature, returns):
+    """Leave out the signature of a protocol's constructor, (*args, **kwargs), which nobody calls."""
+    is_protocol = what == "class" and getattr(value, "_is_protocol", False)
+    return ("", None) if is_protocol else None
+
+
 def replace_in_sphinx(old, new) -> None:
     """Replace a function wherever a module of Sphinx has it by name."""
     for name, module in list(sys.modules.items()):
@@ -360,6 +372,7 @@ def setup(app):
     app.connect("include-read", with_own_links)
     app.connect("env-check-consistency", prepare)
     app.connect("missing-reference", without_page)
+    app.connect("autodoc-process-signature", without_signature_of_protocols)
     app.add_post_transform(FullNames)
     app.add_post_transform(NumbersAtTheRight)
     app.add_post_transform(LongWords)

@@ -3,12 +3,13 @@
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import acceptance
-from arms_without_closed_form import GENERAL, SIX
+from arms_without_closed_form import GENERAL, LEFT, RIGHT, SIX
 from dhkit import Arm
 from dhkit.description import from_dh, pose, with_base, with_tool
 from dhkit.errors import ModelError
@@ -167,6 +168,63 @@ def test_four_axes_that_meet_have_a_status():
     assert np.abs(arm.fk(found.q[found.valid]) - T).max() < 1e-9
 
 
+SPECIAL = {
+    "three parallel axes": [
+        (0, 0.3, 0.1, LEFT),
+        (0, 0.05, 0.5, 0),
+        (0, 0.1, 0.4, 0),
+        (0, 0.1, 0, RIGHT),
+        (0, 0.1, 0.1, LEFT),
+        (0, 0.1, 0, 0),
+    ],
+    "a UR with an offset wrist": [
+        (0, 0.1, 0, RIGHT),
+        (0, 0, -0.4, 0),
+        (0, 0, -0.4, 0),
+        (0, 0.1, 0, RIGHT),
+        (0, 0.1, 0.03, LEFT),
+        (0, 0.1, 0, 0),
+    ],
+    "planar": [(0, 0, length, 0) for length in (0.3, 0.2, 0.1, 0.2, 0.1, 0.1)],
+    "one centre": [(0, 0, 0, RIGHT)] * 6,
+    "one axis": [(0, 0.3, 0, 0)] * 6,
+    "spherical wrist on a twisted arm": [
+        (0, 0.36, 0, LEFT),
+        (0, 0, 0.42, RIGHT),
+        (0, 0, 0, LEFT),
+        (0, 0.4, 0, RIGHT),
+        (0, 0, 0, LEFT),
+        (0, 0.126, 0, 0),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+def test_a_pose_that_was_made_is_never_said_to_be_out_of_reach(name, law):
+    """States where polynomials vanish, or where poses beside them are not reached."""
+    arm = Arm.from_dh(SPECIAL[name], name="special")
+    rng = np.random.default_rng(6)
+    count = law.samples(2000, 20)
+    q = rng.integers(-4, 5, (count, 6)) * (np.pi / 4)
+    q[::2, :5] = 0.0
+    found = arm.ik(arm.fk(q))
+    assert not np.any(found.status == "out_of_reach")
+    assert not found.complete
+    assert np.mean(found.valid.any(axis=1)) > 0.9
+    assert closure(arm, found, arm.fk(q)) < 1e-8
+
+
+def test_a_missing_solution_is_not_called_complete(law):
+    """The two flips of a spherical wrist share joints 1 to 3, so that roots are double at every pose."""
+    arm = Arm.from_dh(SPECIAL["spherical wrist on a twisted arm"], name="twisted")
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (law.samples(2000, 20), 6))
+    for state in q:
+        T = arm.fk(state)
+        found = arm.ik(T)
+        missed = distance(replace(found, q=found.q[None]), state[None])[0] > 1e-5
+        assert not (missed and found.complete)
+
+
 @pytest.mark.parametrize("kinds", ["RRRRR", "RRPRRR", "RRRRRRRR"])
 def test_other_arms_are_refused(kinds):
     arm = from_dh([(0, 0.1 * (k + 1), 0.2, 0.3 * k + 0.1) for k in range(len(kinds))], kinds=kinds)
@@ -183,6 +241,8 @@ def test_arguments_that_do_not_fit_are_said():
         inverse_kinematics(arm, np.eye(3))
     with pytest.raises(ValueError, match="redundancy is given, but oblique has 6 joints"):
         inverse_kinematics(arm, np.eye(4), redundancy=0.1)
+    with pytest.raises(ValueError, match=r"seed has shape \(5,\)|\(5,\)"):
+        inverse_kinematics(arm, np.eye(4), seed=np.zeros(5))
 
 
 @pytest.fixture(scope="module")

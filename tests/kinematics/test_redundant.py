@@ -8,6 +8,7 @@ from arms_without_closed_form import GEN3, SEVEN
 from dhkit import Arm
 from dhkit.kinematics import IKStatus
 from dhkit.kinematics.redundant import redundancy_of
+from dhkit.kinematics.solver import solver_for
 
 CLOSES = 1e-12
 
@@ -115,6 +116,19 @@ def test_arguments_that_do_not_fit_are_said():
         found = arm.ik(T, out=out, **options)
         assert found.q is out
         assert np.array_equal(out, arm.ik(T, **options).q, equal_nan=True)
+    for wrong in ("0.5", 2j, np.ma.masked_array([0.1], [True])):
+        with pytest.raises(TypeError, match=r"redundancy: found .* expected numbers"):
+            arm.ik(T, redundancy=wrong)
+    for wrong in (1e300, np.inf):
+        with pytest.raises(ValueError, match="redundancy is not finite or too large"):
+            arm.ik(T, redundancy=wrong)
+    with pytest.raises(ValueError, match=r"redundancy has shape \(1,\); expected \(\)$"):
+        arm.ik(T[0], redundancy=[0.5])
+    with pytest.raises(ValueError, match="redundancy and seed are given"):
+        arm.ik(T, redundancy=0.5, seed="ready")
+    with pytest.raises(ValueError, match="T is not a pose"):
+        arm.redundancy_intervals(np.full((4, 4), np.nan))
+    assert arm.ik(T, redundancy=0.5).redundancy.flags.writeable
     with pytest.raises(ValueError, match="redundancy is given, but puma560 has 6 joints"):
         Arm.load("puma560").ik(T, redundancy=0.0)
 
@@ -164,6 +178,31 @@ def test_intervals_of_the_redundancy_have_solutions_inside_and_none_at_their_end
             for beyond in (begin - 1e-6, end + 1e-6):
                 if -np.pi < beyond < np.pi and lower[6] < beyond < upper[6]:
                     assert not arm.ik(T, redundancy=beyond).allowed.any()
+
+
+def test_compiled_kernels_give_the_same(monkeypatch):
+    """Poses that broadcasting repeats have no memory of their own, which kernels need."""
+    for name in ("Franka Panda", "KUKA iiwa 14"):
+        arm = SEVEN[name]
+        T = arm.fk(np.full(7, 0.3))
+        intervals = arm.redundancy_intervals(T)
+        preferred = arm.ik(T, prefer="limits")
+        family, fit = arm.family.redundant
+        solver_for(arm.description, family, fit).kernel.compile()
+        assert np.allclose(arm.redundancy_intervals(T), intervals, atol=1e-8)
+        again = arm.ik(T, prefer="limits")
+        assert again.redundancy == preferred.redundancy
+        assert np.allclose(again.q, preferred.q, atol=1e-12, equal_nan=True)
+        repeated = np.broadcast_to(T, (5, 4, 4))
+        assert arm.ik(repeated, redundancy=0.5).q.shape == (5, 8, 7)
+
+
+def test_a_path_with_many_lost_poses_ends_soon():
+    arm = SEVEN["Franka Panda"]
+    T = np.repeat(arm.fk("ready")[None], 60, axis=0)
+    T[:, 0, 3] += np.linspace(0, 2, 60)
+    path = arm.ik_path(T, "ready")
+    assert 20 < len(path.lost) < 60
 
 
 def test_a_preference_chooses_the_best_of_the_tried_values():

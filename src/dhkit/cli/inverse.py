@@ -181,7 +181,11 @@ def ik(
     value = None if redundancy is None else float(numbers([redundancy], "--redundancy", [1])[0])
     if value is not None and degrees:
         value = math.radians(value)
-    solutions, method, note = _solve(arm, T, near_q, value, limits=limits, numeric=numeric)
+    seed = near_q
+    if seed is None and value is None and like is not None and arm.family.redundant is not None:
+        # At the redundancy of the joint values that the pose is taken from.
+        seed = option_values(arm, like, "--like", degrees, OutsideLimits.ALLOWED)
+    solutions, method, note = _solve(arm, T, seed, value, limits=limits, numeric=numeric)
     shown = solutions.allowed if limits else solutions.valid
     reached = ReachedPose(
         arm=arm,
@@ -215,7 +219,8 @@ def _solve(
     note = ""
     if not numeric:
         try:
-            return arm.ik(T, seed=near, redundancy=redundancy), _method_of(arm), ""
+            seed = near if redundancy is None else None
+            return arm.ik(T, seed=seed, redundancy=redundancy), _method_of(arm), ""
         except ModelError as error:
             note = f"one solution by iteration: {error}"
     solutions = arm.ik_numeric(T, near)

@@ -69,7 +69,8 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     is_delicate[rows] = found.is_delicate
     flags = _singular_flags(description, table, is_delicate)
     none_exist = np.zeros(posed.size, dtype=bool)
-    none_exist[rows] = found.is_complete & (found.counts == 0)
+    if not has_curves(description):
+        none_exist[rows] = found.is_complete & (found.counts == 0)
     return collect(
         description,
         table.reshape(*poses.shape[:-2], B, description.n),

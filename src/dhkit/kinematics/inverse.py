@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, takes_robot
+from dhkit.description.frames import configuration
 from dhkit.errors import ModelError
 from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.closed_form import classify
@@ -241,4 +242,15 @@ def _solved_otherwise(
         return solve_from_neighbour(description, T, seed)
     if description.n == JOINTS:
         return solve_redundant(description, T, seed, redundancy, threads, prefer)
+    if seed is not None:
+        _check_seed(description, seed, T.shape[:-2])
     return solve_by_elimination(description, T)
+
+
+def _check_seed(description: Description, seed: ArrayLike, batch: tuple[int, ...]) -> None:
+    """Raise ValueError or TypeError unless there is a seed for every pose, though elimination has no use for it."""
+    start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
+    shape = joint_array(description, start, "seed").shape
+    expected = (*batch, description.n)
+    if shape not in ((description.n,), expected):
+        raise ValueError(f"seed has shape {shape}; expected ({description.n},) or {expected}")

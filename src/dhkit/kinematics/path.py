@@ -19,13 +19,15 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.inverse import inverse_kinematics
 from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
-from dhkit.kinematics.numeric import solve_numerically
+from dhkit.kinematics.numeric import RESTARTS, solve_numerically
 from dhkit.kinematics.numeric_call import numeric_call
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 from dhkit.kinematics.solver import solver_of
 
 _MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
+_RESTARTS_AFTER_LOST = 7
+"""Number of restarts of the search for a pose that comes after a lost one."""
 _FAR = 1e6
 """Joint value that stands for none, rad or m, farther away than any."""
 _WHOLE = 6
@@ -231,9 +233,14 @@ def _followed_by_iteration(
     branch = [""] * len(poses)
     at = q0
     for k, T in enumerate(poses):
-        found = call(T, at, _TOLERANCE, 0) if limits else None
+        # Next to a lost pose others are probably lost as well, which many restarts would take long to say.
+        is_after_lost = k > 0 and not branch[k - 1]
+        found = call(T, at, _TOLERANCE, 0) if limits and not is_after_lost else None
         if found is None:
-            found = solve_numerically(description, T, at, tolerance=_TOLERANCE, limits=limits)
+            restarts = _RESTARTS_AFTER_LOST if is_after_lost else RESTARTS
+            found = solve_numerically(
+                description, T, at, restarts=restarts, tolerance=_TOLERANCE, limits=limits
+            )
         if found.valid[0]:
             # Angles of joints without limits are in (-pi, pi]: the whole turns of the joints before are added.
             turns = np.rint((at - found.q[0]) / math.tau)

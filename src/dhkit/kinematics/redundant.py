@@ -24,12 +24,13 @@ from dhkit.description import (
     world_to_frames,
     world_to_tool,
 )
+from dhkit.description.arrays import number_array
 from dhkit.description.frames import carrying, configuration
 from dhkit.description.poses import inverse_pose
 from dhkit.errors import ModelError
-from dhkit.kernels import pose_rows
+from dhkit.kernels import EXACT_RANGE, pose_rows
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import collect
+from dhkit.kinematics.candidates import are_poses, collect
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
@@ -240,25 +241,32 @@ def _asked_for(
     batch: tuple[int, ...],
 ) -> Array | None:
     """Return the redundancies that a caller asks for, shape ``batch``; None if any will do."""
+    if redundancy is not None and seed is not None:
+        raise ValueError("redundancy and seed are given, which has a redundancy of its own")
+    shapes = f"{batch}" if not batch else f"() or {batch}"
     if redundancy is not None:
-        given = np.asarray(redundancy, dtype=float)
+        given = number_array(redundancy, "redundancy", shapes)
+        values = _broadcast(given, batch, f"redundancy has shape {given.shape}; expected {shapes}")
         name = "redundancy"
-        expected = f"() or {batch}"
     elif seed is not None:
         start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
-        given = redundancy_of(description, joint_array(description, start, "seed"))
+        joints = joint_array(description, start, "seed")
+        expected = f"seed has shape {joints.shape}; expected ({JOINTS},) or {(*batch, JOINTS)}"
+        values = _broadcast(redundancy_of(description, joints), batch, expected)
         name = "seed"
-        expected = f"({JOINTS},) or {(*batch, JOINTS)}"
     else:
         return None
-    try:
-        values = np.broadcast_to(given, batch)
-    except ValueError:
-        shape = given.shape if redundancy is not None else (*given.shape, JOINTS)
-        raise ValueError(f"{name} has shape {shape}; expected {expected}") from None
-    if not np.isfinite(values).all():
-        raise ValueError(f"{name} is not finite; expected rad")
+    if not (np.abs(values) <= EXACT_RANGE).all():
+        raise ValueError(f"{name} is not finite or too large; expected at most {EXACT_RANGE:g} rad")
     return values
+
+
+def _broadcast(values: Array, batch: tuple[int, ...], message: str) -> Array:
+    """Return values as a new array of the shape ``batch``."""
+    try:
+        return np.array(np.broadcast_to(values, batch))
+    except ValueError:
+        raise ValueError(message) from None
 
 
 def _at_tried_values(solver: _AtRedundancy, T: Array, threads: int) -> IKSolutions:
@@ -306,9 +314,10 @@ def _score_of(description: Description, prefer: Preference) -> _Score:
             return _Score(partial(_share_of_limits, numbers.lower, numbers.upper))
         if prefer == "manipulability":
             return _Score(lambda q: manipulability(description, q, "whole"))
-        raise ValueError(
-            f"prefer is {prefer!r}; expected 'limits', 'manipulability' or joint positions"
-        )
+        if prefer not in description.configurations:
+            raise ValueError(
+                f"prefer is {prefer!r}; expected 'limits', 'manipulability', joint positions or a configuration"
+            )
     posture = joint_vector(description, prefer, "prefer")
     return _Score(lambda q: -np.sum((q - posture) ** 2, axis=-1), posture)
 
@@ -392,6 +401,8 @@ def redundancy_intervals(
     pose = pose_rows(T)
     if pose.ndim != 2:
         raise ValueError(f"T has shape {pose.shape}; expected (4, 4)")
+    if not are_poses(pose):
+        raise ValueError("T is not a pose; expected a finite position and an orthonormal rotation")
     _check_seven(description)
     solver = _AtRedundancy.of(description)
 

@@ -93,9 +93,12 @@ def solve_in_closed_form(
             flags.reshape(count, B),
             status.reshape(count, 1),
         ]
-        solver.kernel(
-            solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads
-        )
+        # Kernels read arrays without gaps; those that broadcasting made have none of their own.
+        inputs = [
+            np.ascontiguousarray(poses.reshape(count, 16)),
+            np.ascontiguousarray(free.reshape(count, 2)),
+        ]
+        solver.kernel(solver.parameters, inputs, rows, threads)
         # A single call has no time to look for others.
         is_one_in_reach = count == 1 and distance.item() == 0.0
         if has_offset_wrist(fit) and not is_one_in_reach:

@@ -40,6 +40,10 @@ _AS_POWERS = np.array([[0, 1, 0], [0.5, 0, 0.5], [0.5j, 0, -0.5j]])
 """1, cosine and sine times x = e^(i q), as factors of 1, x and x^2."""
 _CHANGES = (1e-15, 1e-14, 1e-13)
 """Shares of their largest entry by which matrices are changed that are exactly singular."""
+_DOUBLE = 1e-7
+"""Share of a matrix's norm below which a second vector counts as taken to 0."""
+_MIXED = 0.7 + 0.3j
+"""Factor t of t x + y, by which two solutions differ even if they share x or y."""
 _OF_TWO_POWERS = np.kron(_AS_POWERS, _AS_POWERS)
 
 
@@ -111,9 +115,10 @@ class General:
         """
         motions = self._motions(poses)
         reduced, other = self._reduced(motions)
-        kept = angles
-        # The null vector holds the products x^j y^k, j = 0 to 3, k = 0 to 2, of x and y on the unit circle.
-        null = _null_vectors(_matrix(reduced, kept)).reshape(-1, 4, 3)
+        of_root, null = _null_vectors(_matrix(reduced, angles))
+        kept = angles[of_root]
+        motions = motions[of_root]
+        other = other[of_root]
         second = np.angle((null[:, 1:] * null[:, :-1].conj()).sum(axis=(1, 2)))
         third = np.angle((null[:, :, 1:] * null[:, :, :-1].conj()).sum(axis=(1, 2)))
 
@@ -129,7 +134,7 @@ class General:
         # Their order is cos b, sin b, cos a, cos a cos b, cos a sin b, sin a, ...
         a = np.arctan2(products[:, 5, 0], products[:, 2, 0])
         b = np.arctan2(products[:, 1, 0], products[:, 0, 0])
-        return np.arange(len(poses)), self._joints(motions, (kept, second, third), (a, b))
+        return of_root, self._joints(motions, (kept, second, third), (a, b))
 
     def _joints(
         self, motions: Array, near: tuple[Array, Array, Array], far: tuple[Array, Array]
@@ -297,19 +302,52 @@ def _matrix(reduced: tuple[Complex, Complex, Complex], angle: Array) -> Complex:
     return matrix
 
 
-def _null_vectors(matrices: Complex) -> Complex:
-    """Return the vectors that nearly singular matrices (N, k, k) take nearly to 0, shape (N, k).
+def _null_vectors(matrices: Complex) -> tuple[NDArray[np.intp], Complex]:
+    """Return the vectors that nearly singular matrices (N, 12, 12) take nearly to 0.
 
-    Inverse iteration: the solution of A x = b is long in their direction.
+    They hold the products x^j y^k, j = 0 to 3, k = 0 to 2, of x and y on the unit circle. A matrix has two of them
+    where two solutions share the angle of joint i, as the two flips of a spherical wrist do.
+
+    Returns
+    -------
+    tuple[NDArray[np.intp], Complex]
+        Indices of the matrices, shape (K,), and the vectors, shape (K, 4, 3).
     """
-    b = np.random.default_rng(0).normal(size=(matrices.shape[1], 1))
-    solved = _solved(matrices, b)[:, :, 0]
+    # Inverse iteration: solutions of A x = b are long in the directions that A takes to 0.
+    size = matrices.shape[1]
+    b = np.random.default_rng(0).normal(size=(size, 2))
+    solved = _solved(matrices, b)
     length = np.linalg.norm(solved, axis=1, keepdims=True)
-    return np.asarray(solved / np.where(length > 0, length, 1.0))
+    basis, _ = np.linalg.qr(solved / np.where(length > 0, length, 1.0))
+    residual = np.linalg.norm(matrices @ basis[:, :, 1:], axis=(1, 2))
+    is_double = residual < _DOUBLE * np.linalg.norm(matrices, axis=(1, 2))
+
+    single = np.flatnonzero(~is_double)
+    double = np.flatnonzero(is_double)
+    of_matrix = np.concatenate([single, double, double])
+    vectors = np.concatenate([basis[single, :, 0], *_separated(basis[double])])
+    return of_matrix, vectors.reshape(-1, 4, 3)
+
+
+def _separated(basis: Complex) -> tuple[Complex, Complex]:
+    """Return the two vectors of products, shape (N, 12) each, in the planes that bases (N, 12, 2) span.
+
+    With P the entries x^j y^k for j < 3 and k < 2, and S the same of t x + y times these, S c = (t x + y) P c for the
+    coordinates c of either vector: the eigenvectors of P^+ S.
+    """
+    products = basis.reshape(-1, 4, 3, 2)
+    low = products[:, :3, :2].reshape(-1, 6, 2)
+    by_x = products[:, 1:, :2].reshape(-1, 6, 2)
+    by_y = products[:, :3, 1:].reshape(-1, 6, 2)
+    adjoint = low.conj().swapaxes(1, 2)
+    right = adjoint @ (_MIXED * by_x + by_y)
+    _, coordinates = np.linalg.eig(_solved(adjoint @ low, right))
+    vectors = basis @ coordinates
+    return vectors[:, :, 0], vectors[:, :, 1]
 
 
 def _solved(matrices: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
-    """Return the solutions of linear equations (N, k, k) and (N or 1, k, 1), large where a matrix is nearly singular.
+    """Return the solutions of linear equations (N, k, k) and (..., k, m), large where a matrix is nearly singular.
 
     Should a matrix be exactly singular, all are changed by a random one, hardly larger than rounding.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,20 +16,18 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.numeric import refined, solve_numerically
 from dhkit.kinematics.polynomial.general import General
-from dhkit.kinematics.polynomial.solve import Elimination, Found, distinct, solve
+from dhkit.kinematics.polynomial.solve import MOST, Elimination, Found, distinct, solve
 from dhkit.kinematics.polynomial.two_parallel import TwoParallel
 
-_MOST = 16
-"""Largest number of solutions of a pose."""
 _TRIALS = 64
 """Number of random poses by which eliminations are compared."""
 _FOUND = 1e-5
 """Largest difference, rad, of a solution from the joint values that made the pose."""
 _MISSED_COUNTS = 4
 """Number of poses with an incomplete set of solutions that one missed solution counts as."""
-_DISPLACEMENTS = (1e-4, 1e-3)
+_DISPLACEMENTS = (1e-4, 1e-3, 1e-2)
 """Sizes of displacements, rad and share of the reach: the roots at a double root's pose are then 1e-2 apart."""
-_STARTS = 32
+_STARTS = 64
 _MAX_ROUNDS = 8
 """Number of random starts in a round of iterations, and largest number of rounds."""
 _CLOSES = 1e-11
@@ -78,33 +76,29 @@ class SixJoints:
         found = solve(self.description, self.elimination, poses)
         rows = np.flatnonzero(~found.is_complete)
         if len(rows):
-            found = _with(found, rows, self._from_beside(poses[rows]))
+            found = _with(found, rows, *self._from_beside(poses[rows]))
             rows = rows[~found.is_complete[rows]]
         if len(rows):
-            found = _with(found, rows, self._iterated(poses[rows], found, rows))
+            found = _with(found, rows, *self._iterated(poses[rows], found, rows))
         return found
 
-    def _from_beside(self, poses: Array) -> Found:
-        """Return solutions of poses (M, 16) by Newton's method from those of displaced poses.
+    def _from_beside(self, poses: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Return solutions (K, 6) of poses (M, 16) by Newton's method from those of displaced poses, and their poses.
 
         To both sides, for of two solutions that nearly coincide there is perhaps none at one side.
         """
         q = []
         owner = []
-        # Where two solutions meet, one side has two more than the pose itself.
-        expected = np.full(len(poses), _MOST, dtype=np.intp)
-        is_exact = np.ones(len(poses), dtype=bool)
         for displaced in _displaced(poses, Axes.of(self.description).scale):
             beside = solve(self.description, self.elimination, displaced)
             ends, closed = refined(self.description, beside.q, poses[beside.owner])
             q.append(ends[closed])
             owner.append(beside.owner[closed])
-            expected = np.minimum(expected, beside.expected)
-            is_exact &= beside.is_exact
-        is_delicate = np.ones(len(poses), dtype=bool)
-        return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact, is_delicate)
+        return np.concatenate(q), np.concatenate(owner)
 
-    def _iterated(self, poses: Array, known: Found, rows: NDArray[np.intp]) -> Found:
+    def _iterated(
+        self, poses: Array, known: Found, rows: NDArray[np.intp]
+    ) -> tuple[Array, NDArray[np.intp]]:
         """Return what iterations from random starts find, until a round of them finds nothing new.
 
         Parameters
@@ -135,11 +129,12 @@ class SixJoints:
                 np.concatenate([q, found.q[reached, 0]]),
                 np.concatenate([owner, of_start[reached]]),
             )
-            waiting = waiting[np.bincount(owner, minlength=len(rows))[waiting] > before[waiting]]
+            # More than 16 are points of a curve of solutions.
+            counts = np.bincount(owner, minlength=len(rows))[waiting]
+            waiting = waiting[(counts > before[waiting]) & (counts <= MOST)]
             if not len(waiting):
                 break
-        none = np.zeros(len(rows), dtype=np.intp)
-        return Found(q, owner, none, none != 0, none == 0)
+        return q, owner
 
 
 def _displaced(poses: Array, length: float) -> Iterator[Array]:
@@ -174,15 +169,11 @@ def has_two_parallel(description: Description) -> bool:
     return description.kinds == "RRRRRR" and six_joints(description).two_parallel is not None
 
 
-def _with(found: Found, rows: NDArray[np.intp], more: Found) -> Found:
-    """Return solutions with those of some of the poses, whose indices are ``rows``, added."""
-    q, owner = distinct(
-        np.concatenate([found.q, more.q]), np.concatenate([found.owner, rows[more.owner]])
+def _with(found: Found, rows: NDArray[np.intp], more: Array, owner: NDArray[np.intp]) -> Found:
+    """Return solutions with others (K, 6) added; ``owner`` are indices of ``rows``, those of the poses, shape (K,)."""
+    q, owners = distinct(
+        np.concatenate([found.q, more]), np.concatenate([found.owner, rows[owner]])
     )
-    expected = found.expected.copy()
-    is_exact = found.is_exact.copy()
-    expected[rows] = more.expected
-    is_exact[rows] = more.is_exact
     is_delicate = found.is_delicate.copy()
     is_delicate[rows] = True
-    return Found(q, owner, expected, is_exact, is_delicate)
+    return replace(found, q=q, owner=owners, is_delicate=is_delicate)

@@ -26,10 +26,10 @@ _NUMBERED = 3
 """Number of joints that make the number by which solutions are sorted."""
 _SPACING = 10.0
 """Distance of the numbers of two poses; those of one pose differ by up to 6."""
+MOST = 16
+"""Largest number of solutions of a pose, unless they are infinitely many."""
 _NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
-_NEIGHBOURS = 4
-"""Number of solutions, in the order of a number that is the same for equal ones, that each is compared with."""
 
 
 class Elimination(Protocol):
@@ -62,8 +62,15 @@ class Found:
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:
-        """Whether a pose has as many solutions as its polynomial has real roots, shape (N,)."""
-        return self.is_exact & (self.counts >= self.expected)
+        """Whether a pose has as many solutions as its polynomial has real roots, shape (N,).
+
+        Their number is even and at most 16, for complex ones come in pairs: of an odd number one is missing, or two
+        coincide.
+        """
+        counts = self.counts
+        is_possible = (counts % 2 == 0) & (counts <= MOST)
+        complete: NDArray[np.bool_] = self.is_exact & (counts >= self.expected) & is_possible
+        return complete
 
     @property
     def counts(self) -> NDArray[np.intp]:
@@ -110,10 +117,11 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
 
 
 def _with_near_roots(roots: trigonometric.Roots) -> NDArray[np.intp]:
-    """Return the indices of polynomials of which two roots nearly coincide, or nearly have an imaginary part."""
-    number = roots.angle + _SPACING * roots.owner
+    """Return the indices of polynomials of which two roots nearly coincide."""
+    is_near = roots.height < _NEAR_ROOTS
+    number = roots.angle[is_near] + _SPACING * roots.owner[is_near]
     order = np.argsort(number)
-    owner = roots.owner[order]
+    owner = roots.owner[is_near][order]
     are_near = np.diff(number[order]) < _NEAR_ROOTS
     # The first and the last root of a polynomial may be near to each other through pi.
     ends = np.flatnonzero(np.diff(owner, prepend=-1, append=-1))
@@ -151,8 +159,10 @@ def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]
     owner = owner[order]
     number = number[order]
     is_new = np.ones(len(q), dtype=bool)
-    for lag in range(1, min(_NEIGHBOURS, len(q) - 1) + 1):
+    for lag in range(1, len(q)):
         near = np.flatnonzero(number[lag:] - number[:-lag] < _NUMBERED * _SAME_SOLUTION)
+        if not len(near):
+            break
         # |e^(ia) - e^(ib)| = 2 |sin((a - b) / 2)|, about |a - b|.
         apart = 2 * np.abs(np.sin((q[near + lag] - q[near]) / 2)).max(axis=1)
         is_new[near[apart <= _SAME_SOLUTION] + lag] = False

@@ -51,12 +51,13 @@ def coefficients(values: Array) -> tuple[NDArray[np.complex128], Array]:
     -------
     tuple[NDArray[np.complex128], Array]
         c_0 to c_8, shape (N, 9), the largest of absolute value 1; and the largest of c_9 and c_10, which are 0 but for
-        rounding, shape (N,).
+        rounding, shape (N,), infinite for values that are all 0.
     """
     c = np.fft.rfft(values, axis=1) / SAMPLES
     largest = np.abs(c[:, : DEGREE + 1]).max(axis=1, initial=0.0)
     c /= np.where(largest > 0, largest, 1.0)[:, None]
-    return c[:, : DEGREE + 1], np.abs(c[:, DEGREE + 1 :]).max(axis=1)
+    beyond = np.abs(c[:, DEGREE + 1 :]).max(axis=1)
+    return c[:, : DEGREE + 1], np.where(largest > 0, beyond, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,8 @@ class Roots:
     """Index of the polynomial of each root, shape (K,), in ascending order."""
     angle: Array
     """The root's real part, shape (K,), rad, in (-pi, pi]."""
+    height: Array
+    """The root's imaginary part without its sign, shape (K,), rad."""
     is_real: NDArray[np.bool_]
     """Whether the root is real up to its error, shape (K,)."""
 
@@ -96,7 +99,7 @@ def real_roots(c: NDArray[np.complex128], beyond: Array) -> Roots:
     of_owner = c[owner, 1:]
     slope = np.abs((of_owner * powers - of_owner.conj() * inverse_powers) @ k)
     error = np.maximum(_ERROR_OF_VALUE, beyond[owner])
-    return Roots(owner, np.angle(z), height * slope < error)
+    return Roots(owner, np.angle(z), height, height * slope < error)
 
 
 def _powers(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
