@@ -50,7 +50,7 @@ def inverse_kinematics(
     seed
         Joint positions, shape (n,) or (..., n), rad and m. Where two axes of the wrist coincide, one joint is free (q4,
         or q6 of an arm with three parallel axes), and where the point that joint 1 turns is on its axis, joint 1 is:
-        a free joint takes its angle from the seed, or 0. An arm of seven joints takes joint 7 from it.
+        a free joint takes its angle from the seed, or 0. An arm of seven joints takes its redundancy from it.
     out
         Array for the joint positions, shape (..., B, n), float64, contiguous. Only for closed forms.
     threads

@@ -30,7 +30,8 @@ class IKStatus(IntEnum):
     singular = 1
     """Reached, but a branch is at a singularity: see its flags."""
     out_of_reach = 2
-    """Proved to have no solution, by a closed form or because the arm is too short."""
+    """No solution exists: by a closed form, because the arm is too short, or because the polynomial of six joints, computed
+    in floating-point numbers, has no real root."""
     not_a_pose = 3
     """The matrix has NaN, or its rotation is not orthonormal to 2e-6."""
     not_found = 4
@@ -87,7 +88,7 @@ class IKSolutions:
     """Whether a pose that is reached has no other solutions than these; False where they were found by iteration, which
     may miss some, and for arms of seven joints, which have infinitely many."""
     redundancy: Array | None = None
-    """For arms of seven joints the value of joint 7 that the solutions of each pose have, shape (...), rad."""
+    """For arms of seven joints the redundancy of each pose's solutions, joint 7 or the arm angle, shape (...), rad."""
 
     @classmethod
     def of_packed(cls, q: Array, packed: bytes, shared: Mapping[str, object]) -> IKSolutions:
