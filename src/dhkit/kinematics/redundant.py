@@ -46,6 +46,10 @@ _LAST_JOINT = "joint 7"
 _TRIED = 32
 """Number of steps between the values that are tried where none is asked for."""
 _WHOLE_TURN = (-np.pi, np.pi)
+_TRIED_AT_ONCE = 32
+"""Number of values that are tried together in a closed form; by elimination they are tried one by one."""
+_RESTARTS = 31
+"""Number of restarts of the search for a solution between the tried values; where there is one, few are needed."""
 _PREFERRED_TOGETHER = 256
 """Poses whose solutions at all tried values are held together, some 4 MB."""
 _STEP = np.pi / 360
@@ -277,18 +281,29 @@ def _at_tried_values(solver: _AtRedundancy, T: Array, threads: int) -> IKSolutio
     first = solver(T, np.full(batch, tried[0]), threads)
     has_some = first.valid.any(axis=-1).ravel()
     posed = first.status_code.ravel() != IKStatus.not_a_pose
-    waiting = np.flatnonzero(~first.allowed.any(axis=-1).ravel() & posed)
+    has_allowed = first.allowed.any(axis=-1).ravel() | ~posed
+    waiting = np.flatnonzero(~has_allowed)
     if not len(waiting):
         return first
     chosen = np.full(len(poses), tried[0])
-    for value in tried[1:]:
-        found = solver(poses[waiting], np.full(len(waiting), value), threads)
-        is_allowed = found.allowed.any(axis=-1)
-        is_first = found.valid.any(axis=-1) & ~has_some[waiting]
-        better = waiting[is_allowed | is_first]
-        chosen[better] = value
-        has_some[better] = True
-        waiting = waiting[~is_allowed]
+    at_once = 1 if isinstance(solver.method, Description) else _TRIED_AT_ONCE
+    for begin in range(1, len(tried), at_once):
+        values = tried[begin : begin + at_once]
+        for some in np.array_split(waiting, -(-len(waiting) // _PREFERRED_TOGETHER)):
+            shape = (len(values), len(some))
+            repeated = np.broadcast_to(poses[some], (*shape, 4, 4))
+            found = solver(repeated, np.broadcast_to(values[:, None], shape), threads)
+            is_allowed = found.allowed.any(axis=-1)
+            is_some = found.valid.any(axis=-1)
+            # The first value that allows a solution, or else the first with any.
+            is_better = is_allowed.any(axis=0) | (is_some.any(axis=0) & ~has_some[some])
+            first_allowed = is_allowed.argmax(axis=0)
+            first_some = is_some.argmax(axis=0)
+            place = np.where(is_allowed.any(axis=0), first_allowed, first_some)
+            chosen[some[is_better]] = values[place[is_better]]
+            has_some[some[is_better]] = True
+            has_allowed[some] = is_allowed.any(axis=0)
+        waiting = waiting[~has_allowed[waiting]]
         if not len(waiting):
             break
     else:
@@ -448,7 +463,7 @@ def _choose_by_iteration(
             waiting = waiting[~has_some[waiting]]
         if not len(waiting):
             return
-        found = solve_numerically(description, poses[waiting], limits=limits)
+        found = solve_numerically(description, poses[waiting], restarts=_RESTARTS, limits=limits)
         is_found = found.valid[:, 0]
         chosen[waiting[is_found]] = redundancy_of(description, found.q[is_found, 0])
         has_some[waiting[is_found]] = True

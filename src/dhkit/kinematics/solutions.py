@@ -30,8 +30,8 @@ class IKStatus(IntEnum):
     singular = 1
     """Reached, but a branch is at a singularity: see its flags."""
     out_of_reach = 2
-    """No solution exists: by a closed form, because the arm is too short, or because the polynomial of six joints, computed
-    in floating-point numbers, has no real root."""
+    """No solution exists: by a closed form, because the arm is too short, or because the polynomial of six joints,
+    computed in floating-point numbers, has no real root."""
     not_a_pose = 3
     """The matrix has NaN, or its rotation is not orthonormal to 2e-6."""
     not_found = 4

@@ -27,8 +27,9 @@ def contenders() -> tuple[Contender, ...]:
 
 
 def _single(workload: Workload) -> Task:
-    core = import_peer("frankik")._core
-    poses = workload.T @ _tool(workload, core)
+    package = import_peer("frankik")
+    core = package._core
+    poses = workload.T @ _tool(workload, package)
     starts = workload.q
     items = list(zip(poses, starts, starts[:, 6].tolist(), strict=True))
 
@@ -39,12 +40,16 @@ def _single(workload: Workload) -> Task:
     return Task(one_by_one(core.ik_full, items), answers)
 
 
-def _tool(workload: Workload, core: Any) -> Array:
-    """Return the transform from the arm's tool to frankik's, shape (4, 4)."""
+def _tool(workload: Workload, package: Any) -> Array:
+    """Return the transform from the arm's tool to the frame that frankik's inverse kinematics places, shape (4, 4).
+
+    Its forward kinematics is that of the hand, its inverse kinematics that of the flange.
+    """
     if workload.arm.n != 7:
         raise UnavailableError("takes a Panda or an FR3")
     q = workload.q[:8]
-    theirs = np.array([core.fk(x) for x in q])
+    flange = np.linalg.inv(package.FrankaKinematics.FrankaHandTCPOffset)
+    theirs = np.array([package._core.fk(x) for x in q]) @ flange
     transforms = np.linalg.inv(workload.arm.fk(q)) @ theirs
     if np.abs(transforms - transforms[0]).max() > _SAME_TOOL:
         raise UnavailableError("takes a Panda or an FR3; this arm moves otherwise")
