@@ -70,6 +70,7 @@ $(ACCEPT_READY): $(TEST_READY)
 bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside peers; writes benchmarks/results/
 	$(BIN)/python -m benchmarks.kinematics $(ARGS)
 	$(BIN)/python -m benchmarks.kinematics --robot panda --no-probes --output benchmarks/results/kinematics_panda
+	$(BIN)/python -m benchmarks.kinematics --robot jaco --no-probes --output benchmarks/results/kinematics_jaco
 	$(BIN)/python -m benchmarks.dynamics $(ARGS)
 	$(BIN)/python -m benchmarks.dynamics --robot panda --no-probes --output benchmarks/results/dynamics_panda
 	$(BIN)/python -m benchmarks.planning
