@@ -39,6 +39,8 @@ PAGES = sorted(
 )
 OWN_PAGES = [page for page in PAGES if page not in COLLECTED]
 BLOCK = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+ANY_BLOCK = re.compile(r"^```[^\n]*\n.*?^```$", re.DOTALL | re.MULTILINE)
+"""A block of any kind, includes with arguments too."""
 FILE_NAME = re.compile(r"(?:#|%|//) ([\w-]+\.(?:py|toml|m|c|csv))\n")
 """First line of a block that is a file: its name, as a comment."""
 OTHER_COMMANDS = {"make", "pip", "git", "source", "ros2", "colcon", "octave", "gcc", "python"}
@@ -115,7 +117,7 @@ def run_commands(text: str, capsys) -> None:
 
 def anchors(path: Path) -> set[str]:
     """Return the anchors of a page's headings, as GitHub and the site name them."""
-    text = BLOCK.sub("", path.read_text("utf-8"))
+    text = ANY_BLOCK.sub("", path.read_text("utf-8"))
     return {
         re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-")
         for title in re.findall(r"^#+ (.*)$", text, re.MULTILINE)
@@ -125,7 +127,7 @@ def anchors(path: Path) -> set[str]:
 @pytest.mark.parametrize("page", PAGES)
 def test_the_links_of_a_page_lead_somewhere(page):
     path = ROOT / page
-    text = BLOCK.sub("", path.read_text("utf-8"))
+    text = ANY_BLOCK.sub("", path.read_text("utf-8"))
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         file, _, anchor = target.partition("#")
         if file.startswith(("http", "/_generated/")) or "_generated" in file:

@@ -14,16 +14,28 @@ from dhkit.bench.contenders import (
     Workload,
     import_peer,
     one_by_one,
+    single_task,
 )
 from dhkit.description import Array
+from dhkit.description.poses import inverse_pose
 
 _SAME_TOOL = 1e-9
 """Largest difference of an entry of the tool's transform between states, m."""
 
 
 def contenders() -> tuple[Contender, ...]:
-    """Return frankik's contender; each call takes one pose."""
-    return (Contender("frankik ik_full, joint 7 given", "ik", Mode.SINGLE, _single),)
+    """Return frankik's contenders; each call takes one state or pose."""
+    return (
+        Contender("frankik fk", "fk", Mode.SINGLE, _forward),
+        Contender("frankik ik_full, joint 7 given", "ik", Mode.SINGLE, _single),
+    )
+
+
+def _forward(workload: Workload) -> Task:
+    package = import_peer("frankik")
+    # Its forward kinematics is that of the hand.
+    to_arm = package.FrankaKinematics.FrankaHandTCPOffset @ inverse_pose(_tool(workload, package))
+    return single_task(package._core.fk, workload.q, lambda T: T @ inverse_pose(to_arm))
 
 
 def _single(workload: Workload) -> Task:
