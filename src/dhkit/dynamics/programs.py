@@ -153,7 +153,7 @@ def dynamic_kernels(description: Description) -> list[Kernel]:
     --------
     >>> from dhkit.description import library_robot
     >>> len(dynamic_kernels(library_robot("planar2r")))
-    14
+    15
     """
     kernels = [friction_kernel(description.n, smooth) for smooth in (False, True)]
     kernels.append(wrench_kernel(description)[0])
