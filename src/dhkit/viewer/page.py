@@ -52,6 +52,7 @@ _LAB_FILES = (
     "dom.js",
     "joints.js",
     "tool.js",
+    "redundancy.js",
     "gizmo.js",
     "table.js",
     "motion.js",

@@ -346,11 +346,11 @@ export class Lab {
   }
 }
 
-// Scroll the list of a tab to it. scrollIntoView would also scroll a page that has this one in a frame.
+// Scroll the rail to a tab. scrollIntoView would also scroll a page that has this one in a frame.
 function showWithin(tab) {
-  const list = tab.closest("[role=tablist]");
-  if (!list) return;
-  const [outer, inner] = [list.getBoundingClientRect(), tab.getBoundingClientRect()];
-  list.scrollLeft += Math.max(inner.right - outer.right, 0) + Math.min(inner.left - outer.left, 0);
-  list.scrollTop += Math.max(inner.bottom - outer.bottom, 0) + Math.min(inner.top - outer.top, 0);
+  const rail = tab.closest("nav"),
+    [outer, inner] = [rail, tab].map((element) => element.getBoundingClientRect());
+  const past = (low, high) =>
+    Math.max(inner[high] - outer[high], 0) + Math.min(inner[low] - outer[low], 0);
+  rail.scrollBy(past("left", "right"), past("top", "bottom"));
 }

@@ -8,11 +8,11 @@ import { Gizmo } from "./gizmo.js";
 
 const AXES = ["x", "y", "z"];
 const AWAY = 1e-4; // m
-const STILL = 250; // ms for which a target must not move before its feasible redundancies are asked for
 const ORDERS = ["XYZ", "ZYX", "ZYZ", "ZXZ", "xyz", "zyx", "zyz", "zxz"];
 
 export class ToolPanel {
-  constructor(lab, root) {
+  // Spare: the slider of a freedom that the target leaves, in pages that Python answers.
+  constructor(lab, root, Spare = null) {
     this.lab = lab;
     this.fields = [];
     this.gizmo = new Gizmo(
@@ -79,7 +79,7 @@ export class ToolPanel {
       { hidden: true, onclick: () => lab.ask("tool.clear") },
       "Remove the target",
     );
-    this.spare = this.redundancy();
+    this.spare = Spare && new Spare(lab);
     this.branches = h("div", { class: "branches", role: "group", "aria-label": "Branches" });
     this.count = h("h2", { hidden: true });
     this.jog = this.jogs();
@@ -88,7 +88,7 @@ export class ToolPanel {
       root.append(
         h("div", { class: "buttons" }, this.grab, this.clear),
         this.note,
-        this.spare.root,
+        ...(this.spare ? [this.spare.root] : []),
         this.jog,
         this.count,
         this.branches,
@@ -144,44 +144,6 @@ export class ToolPanel {
       step: axis > 2 ? size / DEGREES : size / 1000,
       frame: this.frame.value,
     });
-  }
-
-  // A slider for the freedom that an arm of seven joints has left, over the values that reach the target.
-  redundancy() {
-    const slider = h("input", {
-      type: "range",
-      step: "any",
-      "aria-label": "Redundancy",
-      oninput: () => this.lab.ask("tool.redundancy", { value: Number(slider.value) }),
-    });
-    const name = h("span", { class: "name" }),
-      value = h("span", { class: "value" }),
-      band = h("div", { class: "feasible", "aria-hidden": "true" });
-    const root = h("div", { class: "joint spare", hidden: true }, name, value, slider, band);
-    return { root, slider, name, value, band };
-  }
-
-  showRedundancy(redundancy) {
-    const { root, slider, name, value, band } = this.spare;
-    root.hidden = !redundancy;
-    if (!redundancy) return;
-    const { angle } = this.scales();
-    slider.min = String(redundancy.lower);
-    slider.max = String(redundancy.upper);
-    slider.setAttribute("aria-label", redundancy.name);
-    if (document.activeElement !== slider) slider.value = String(redundancy.value);
-    name.textContent = redundancy.name;
-    value.textContent = `${fixed(redundancy.value * angle.scale, angle.digits)} ${angle.sign.trim()}`;
-    const key = JSON.stringify(this.lab.state.target.T);
-    if (this.feasibleAt === key) return;
-    band.style.background = "none";
-    clearTimeout(this.waiting);
-    this.waiting = setTimeout(async () => {
-      const answer = await this.lab.ask("tool.intervals");
-      if (!answer?.intervals || JSON.stringify(this.lab.state.target?.T) !== key) return;
-      this.feasibleAt = key;
-      band.style.background = bands(answer.intervals, redundancy);
-    }, STILL);
   }
 
   async toggle() {
@@ -307,7 +269,7 @@ export class ToolPanel {
     this.count.hidden = branches.length < 2;
     this.count.textContent = `${branches.length} solutions, ${within} within the limits`;
     this.name(ghosts);
-    this.showRedundancy(target?.redundancy);
+    this.spare?.show(target?.redundancy);
     if (focused) this.branches.querySelector(`[data-branch="${CSS.escape(focused)}"]`)?.focus();
     this.show();
   }
@@ -346,16 +308,4 @@ export class ToolPanel {
       button.addEventListener(event, () => this.lab.stage.pointAt(null));
     return button;
   }
-}
-
-// The gradient that paints intervals of a range, in rad.
-function bands(intervals, { lower, upper }) {
-  const share = (x) => `${(100 * (x - lower)) / (upper - lower)}%`;
-  const stops = intervals.flatMap(([begin, end]) => [
-    `transparent ${share(begin)}`,
-    `var(--accent) ${share(begin)}`,
-    `var(--accent) ${share(end)}`,
-    `transparent ${share(end)}`,
-  ]);
-  return stops.length ? `linear-gradient(to right, ${stops.join(", ")})` : "none";
 }
