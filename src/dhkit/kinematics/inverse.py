@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_array, takes_robot
-from dhkit.description.frames import configuration
 from dhkit.errors import ModelError
 from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.closed_form import classify
@@ -249,8 +248,7 @@ def _solved_otherwise(
 
 def _check_seed(description: Description, seed: ArrayLike, batch: tuple[int, ...]) -> None:
     """Raise ValueError or TypeError unless there is a seed for every pose, though elimination has no use for it."""
-    start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
-    shape = joint_array(description, start, "seed").shape
+    shape = joint_array(description, seed, "seed").shape
     expected = (*batch, description.n)
     if shape not in ((description.n,), expected):
         raise ValueError(f"seed has shape {shape}; expected ({description.n},) or {expected}")

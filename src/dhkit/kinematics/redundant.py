@@ -25,7 +25,7 @@ from dhkit.description import (
     world_to_tool,
 )
 from dhkit.description.arrays import number_array
-from dhkit.description.frames import carrying, configuration
+from dhkit.description.frames import carrying
 from dhkit.description.poses import inverse_pose
 from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, pose_rows
@@ -100,11 +100,6 @@ def solve_redundant(
     """
     _check_seven(description)
     solver = _AtRedundancy.of(description)
-    if out is not None and isinstance(solver.method, Description):
-        words = classify(description).words
-        raise ValueError(
-            f"out is given, but {description.name} is {words}: how many branches there will be is open"
-        )
     if prefer is not None:
         if redundancy is not None or seed is not None:
             raise ValueError("prefer is given with redundancy or seed, which leave no choice")
@@ -253,8 +248,7 @@ def _asked_for(
         values = _broadcast(given, batch, f"redundancy has shape {given.shape}; expected {shapes}")
         name = "redundancy"
     elif seed is not None:
-        start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
-        joints = joint_array(description, start, "seed")
+        joints = joint_array(description, seed, "seed")
         expected = f"seed has shape {joints.shape}; expected ({JOINTS},) or {(*batch, JOINTS)}"
         values = _broadcast(redundancy_of(description, joints), batch, expected)
         name = "seed"

@@ -31,12 +31,12 @@ from dhkit.kinematics.closed_form.formulas import (
 from dhkit.kinematics.closed_form.seven_joints import (
     SIGNS,
     Elbow,
-    dot,
     elbow_bent,
     shoulder_parameters,
     sign_names,
     three_joints,
 )
+from dhkit.symbolic.differentiable.vectors import dot
 
 
 def arm_angle_fit(axes: Axes) -> Fit | None:

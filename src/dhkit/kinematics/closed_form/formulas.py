@@ -10,6 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+from dhkit.symbolic.differentiable.vectors import (
+    Vector3,
+    about_x,
+    about_x_back,
+    about_z,
+    about_z_back,
+)
+
 SX: TypeAlias = Any
 """A CasADi SX scalar, or a number instead of one."""
 Pair: TypeAlias = tuple[SX, SX]
@@ -104,20 +112,16 @@ def weighted_sum(
     return x, y, z
 
 
-def turned_about_z(vector: tuple[SX, SX, SX], angle: Pair, sense: float = 1.0) -> tuple[SX, SX, SX]:
+def turned_about_z(vector: Vector3, angle: Pair, sense: float = 1.0) -> Vector3:
     """Return Rz(angle) vector, or Rz(-angle) vector for ``sense`` -1."""
-    x, y, z = vector
-    c = angle[0]
-    s = angle[1] * sense
-    return x * c - y * s, x * s + y * c, z
+    turn = about_z if sense > 0 else about_z_back
+    return turn(*angle, vector)
 
 
-def turned_about_x(vector: tuple[SX, SX, SX], angle: Pair, sense: float = 1.0) -> tuple[SX, SX, SX]:
+def turned_about_x(vector: Vector3, angle: Pair, sense: float = 1.0) -> Vector3:
     """Return Rx(angle) vector, or Rx(-angle) vector for ``sense`` -1."""
-    x, y, z = vector
-    c = angle[0]
-    s = angle[1] * sense
-    return x, y * c - z * s, y * s + z * c
+    turn = about_x if sense > 0 else about_x_back
+    return turn(*angle, vector)
 
 
 def unit_pair(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:

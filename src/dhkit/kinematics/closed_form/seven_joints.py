@@ -33,6 +33,7 @@ from dhkit.kinematics.closed_form.formulas import (
     unit_pair,
     weighted_sum,
 )
+from dhkit.symbolic.differentiable.vectors import dot
 
 SIGNS = (1.0, -1.0)
 RIGHT_ANGLE = 1e-12
@@ -155,11 +156,6 @@ def three_joints(
     back = turned_about_x(turned_about_z(back, theta_2, -1.0), second_twist, -1.0)
     theta_3 = unit_pair(back[0], back[1])
     return (theta_1, theta_2, theta_3), across < SINGULAR
-
-
-def dot(a: Vector, b: Vector) -> SX:
-    """Return the scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def exact_pair(angle: float) -> tuple[float, float]:

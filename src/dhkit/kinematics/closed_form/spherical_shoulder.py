@@ -39,13 +39,13 @@ from dhkit.kinematics.closed_form.formulas import (
 from dhkit.kinematics.closed_form.seven_joints import (
     SIGNS,
     Elbow,
-    dot,
     elbow_bent,
     exact_pair,
     shoulder_parameters,
     sign_names,
     three_joints,
 )
+from dhkit.symbolic.differentiable.vectors import dot
 
 
 def spherical_shoulder_fit(axes: Axes) -> Fit | None:
