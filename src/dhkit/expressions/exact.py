@@ -217,6 +217,10 @@ class Expression:
         return total
 
     def __float__(self) -> float:
+        return self._double
+
+    @cached_property
+    def _double(self) -> float:
         try:
             return float(self.value())
         except OverflowError:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.description import Array, Convention, Description, pose_parts, to_toml
+from dhkit.cached_property import cached_property
+from dhkit.description import Array, Convention, Description, Joint, pose_parts, to_toml
 from dhkit.description.table_rows import quantity
 from dhkit.errors import DhkitError
+from dhkit.expressions import Expression
 from dhkit.kinematics import classify
 from dhkit.kinematics.polynomial.six_joints import has_two_parallel
 from dhkit.lab.desk import Desk
@@ -41,6 +44,11 @@ class Table:
     def has_shapes(self) -> bool:
         """Whether meshes of the arm are known."""
         return any(joint.shapes for joint in self.description.joints)
+
+    @cached_property
+    def description_without_meshes(self) -> Description:
+        """The arm with its links drawn from the table."""
+        return _without_meshes(self.description)
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,10 +252,7 @@ class TablePanel(Panel):
         if errors:
             return Table(texts, last, errors)
         try:
-            joints = tuple(
-                replace(joint, theta=x["theta"], d=x["d"], a=x["a"], alpha=x["alpha"], shapes=())
-                for joint, x in zip(last.joints, rows, strict=True)
-            )
+            joints = tuple(map(_with_entries, last.joints, rows))
             description = replace(last, joints=joints)
             numbers = description.numbers
             beyond = np.argwhere(
@@ -259,8 +264,9 @@ class TablePanel(Panel):
                 }
                 return Table(texts, last, too_large)
             # Who types the first arm's numbers again has it again, with its meshes.
-            first = self._first.description
-            return Table(texts, first if description == _without_meshes(first) else description)
+            first = self._first
+            again = description == first.description_without_meshes
+            return Table(texts, first.description if again else description)
         except (DhkitError, ValueError) as error:
             changed = np.argwhere(np.array(texts) != np.array(self._table.texts))
             cells = [(int(i), int(k)) for i, k in changed] or [(0, 0)]
@@ -319,6 +325,18 @@ def plain_expression(text: str) -> str:
     """
     plain = text.replace("°", "*deg").replace("π", "pi").replace("−", "-")
     return plain if "(" in plain else re.sub(r"(?<=\d),(?=\d)", ".", plain)
+
+
+def _with_entries(joint: Joint, entries: Mapping[str, Expression]) -> Joint:
+    """Return a joint with these entries, without meshes; itself where nothing differs, as it was checked before."""
+    same = all(
+        getattr(joint, name) == value and getattr(joint, name).written == value.written
+        for name, value in entries.items()
+    )
+    if same and not joint.shapes:
+        return joint
+    theta, d, a, alpha = (entries[name] for name in COLUMNS)
+    return replace(joint, theta=theta, d=d, a=a, alpha=alpha, shapes=())
 
 
 def _without_meshes(description: Description) -> Description:

@@ -1,8 +1,8 @@
 // What a slow machine can do without: after a run of late pictures the scene is drawn more plainly, for good.
 
-const LATE = 42; // ms between pictures of a motion
+const LATE = 42; // ms from a picture to the browser's next frame
 const PATIENCE = 6; // late pictures more than timely ones
-const PAUSE = 400; // ms: nothing moved in between
+const PAUSE = 400; // ms: the page was hidden, or busy with something else
 
 // Whether this browser has no graphics processor to draw with.
 export function drawnInSoftware() {
@@ -18,17 +18,21 @@ export class Quality {
   constructor(savings) {
     this.savings = [...savings];
     this.late = 0;
-    this.last = 0;
+    this.picture = -Infinity; // ms, when the last frame began if it drew a picture
   }
 
-  // Called for every picture that was drawn; now in ms.
-  drawn(now) {
-    const interval = now - this.last;
-    this.last = now;
+  // Called at the beginning of every frame of the browser; now in ms.
+  frame(now) {
+    const interval = now - this.picture;
+    this.picture = -Infinity;
     if (interval > PAUSE || !this.savings.length) return;
     this.late = Math.max(0, this.late + (interval > LATE ? 1 : -1));
-    if (this.late < PATIENCE) return;
-    this.save();
+    if (this.late >= PATIENCE) this.save();
+  }
+
+  // Called when a picture was drawn in the frame that began at this time.
+  drawn(now) {
+    this.picture = now;
   }
 
   save() {

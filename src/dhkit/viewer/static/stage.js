@@ -549,7 +549,9 @@ export class Stage {
 
   setGhosts(message) {
     const { nodes } = this;
+    const none = !message.tints.length && !this.ghosts?.tints.length; // then there is nothing to draw again
     this.ghosts = message;
+    if (none) return;
     this.overlays.setGhosts(
       { ...message, tints: this.tints() },
       {
@@ -654,6 +656,7 @@ export class Stage {
 
   render(now) {
     const { viewer } = this;
+    this.quality.frame(now);
     if (now < this.awaited) return;
     if (!viewer.needs_render) return this.refine(now);
     if (this.refines) this.drawFinely(false, !this.shadowsAtRest);

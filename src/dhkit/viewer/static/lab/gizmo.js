@@ -82,6 +82,7 @@ export class Gizmo {
 
   // T: 16 numbers by row, or null for no target.
   set(T, reached, reach) {
+    if (!T && !this.group.visible) return;
     this.group.visible = Boolean(T);
     this.reach = reach;
     if (T && !this.dragged) this.pose.set(...T);

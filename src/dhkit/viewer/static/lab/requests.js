@@ -1,13 +1,14 @@
-// Requests to Python. Of those that a drag repeats one is under way, and behind it waits only the latest (of each joint), so
-// that nothing queues; others, such as steps and edits, are all sent, and answered in order.
+// Requests to Python. Of those that a drag repeats a bounded number is under way, and behind them waits only the latest (of
+// each joint), so that nothing queues; others, such as steps and edits, are all sent, and answered in order.
 
-const REPEATED = new Set([
-  "joints.set",
-  "dynamics.read",
-  "workspace.read",
-  "tool.read",
-  "tool.target",
-  "motion.show",
+// How many may be under way. Two for a dragged target: Python computes one while the page draws the answer to the other.
+const UNDER_WAY = new Map([
+  ["joints.set", 1],
+  ["dynamics.read", 1],
+  ["workspace.read", 1],
+  ["tool.read", 1],
+  ["tool.target", 2],
+  ["motion.show", 1],
 ]);
 
 export class Requests {
@@ -24,9 +25,9 @@ export class Requests {
     return new Promise((resolve) => {
       const request = { name, data, resolve },
         key = `${name} ${data.joint ?? ""}`;
-      const busy =
-        REPEATED.has(name) && [...this.open.values()].some((other) => other.name === name);
-      if (!busy) return this.send(request);
+      const same = [...this.open.values()].filter((other) => other.name === name);
+      const bound = UNDER_WAY.get(name) ?? Infinity;
+      if (same.length < bound) return this.send(request);
       this.waiting.get(key)?.resolve(null);
       this.waiting.set(key, request);
     });
