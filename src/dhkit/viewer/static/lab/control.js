@@ -321,7 +321,7 @@ class GainTable {
       const row = h(
         "tr",
         {},
-        h("th", { scope: "row", title: joint.name }, joint.name),
+        h("th", { scope: "row", title: joint.name }, breakable(joint.name)),
         Object.values(inputs).map((input) => h("td", {}, input)),
         pole,
       );
@@ -339,4 +339,9 @@ class GainTable {
     gains[name][i] = value;
     return this.send(gains);
   }
+}
+
+// A long name may go on in the next line behind an underscore.
+function breakable(name) {
+  return name.replaceAll("_", "_\u200b");
 }
