@@ -108,15 +108,17 @@ export class Stage {
   // Panels are beside the scene: a person moves the arm, and pictures must keep up.
   beside() {
     this.steady = true;
-    if (this.software) this.quality.save();
+    if (this.software) this.quality.saveAll();
     document.body.classList.toggle("software", this.software);
     // The arm of an edited table has surfaces that meshes have not: their program is compiled with the first picture.
-    const like = new THREE.MeshPhongMaterial({
+    const material = new THREE.MeshPhongMaterial({
       shininess: 40,
       specular: 0x222222,
       side: THREE.FrontSide,
     });
-    this.viewer.scene.add(new THREE.Mesh(new THREE.SphereGeometry(0, 3, 2), like));
+    const like = new THREE.Mesh(new THREE.SphereGeometry(0, 3, 2), material);
+    finish(like, !this.plain);
+    this.viewer.scene.add(like);
   }
 
   // Shadows wait, as smooth edges do, until nothing moves.
@@ -131,12 +133,17 @@ export class Stage {
     this.floor.visible = cast;
   }
 
+  // Gloss waits too, where a picture at rest is drawn once more.
   withoutGloss() {
     this.plain = true;
     this.ratio = 1;
     this.viewer.renderer.setPixelRatio(1);
-    for (const node of this.nodes) node.traverse(matt);
+    this.gloss(false);
     this.resize();
+  }
+
+  gloss(glossy) {
+    for (const node of this.nodes) node.traverse((object) => finish(object, glossy));
   }
 
   color() {
@@ -168,6 +175,7 @@ export class Stage {
 
   build({ about, commands, joints }) {
     const { viewer } = this;
+    this.quality.begin();
     const node = (...path) => viewer.scene_tree.find(["dhkit", ...path]).object;
     // An edited arm has the parts it had: nodes stay (meshcat hangs controls on every new one), and what is equal.
     const paths = about.nodes.join(),
@@ -193,7 +201,7 @@ export class Stage {
     this.nodes = [];
     for (let i = 0; i <= joints; i++) this.nodes.push(node(`link${i}`));
     this.nodes.push(node("tool"));
-    if (this.plain) this.nodes.forEach((n) => n.traverse(matt));
+    if (this.plain) this.gloss(false);
     this.parts = null; // of Python, where others are drawn
     this.grid = node("grid", "<object>");
     this.grid.castShadow = this.grid.receiveShadow = false;
@@ -248,8 +256,9 @@ export class Stage {
     for (const root of objects)
       root.traverse((object) => {
         if (!object.material) return;
-        this.old.push(...[object.material].flat());
+        this.old.push(...[object.material, ...(object.userData.finishes ?? [])].flat());
         object.material = spent;
+        delete object.userData.finishes;
       });
   }
 
@@ -692,6 +701,7 @@ export class Stage {
   drawFinely(sharp, shadows) {
     if (sharp !== this.sharp) this.viewer.renderer.setPixelRatio(sharp ? FINEST : this.ratio);
     if (shadows !== this.key.castShadow) this.castShadows(shadows);
+    if (this.plain && sharp !== this.sharp) this.gloss(sharp);
     if (this.grid) this.grid.material.opacity = sharp ? 1 : this.ratio / FINEST;
     this.sharp = sharp;
   }
@@ -742,11 +752,14 @@ function anchors(positions, arm) {
   return Array.from({ length: count }, (_, ghost) => at(ghost, best));
 }
 
-function matt(object) {
-  if (object.material?.type !== "MeshPhongMaterial") return;
-  const { color, side } = object.material;
-  object.material.dispose();
-  object.material = new THREE.MeshLambertMaterial({ color, side });
+// Draw an object in its glossy material, or in a matt one of the same color.
+function finish(object, glossy) {
+  const { material, userData } = object;
+  if (material?.type === "MeshPhongMaterial" && !userData.finishes) {
+    const { color, side } = material;
+    userData.finishes = [material, new THREE.MeshLambertMaterial({ color, side })];
+  }
+  if (userData.finishes) object.material = userData.finishes[glossy ? 0 : 1];
 }
 
 export { THREE };
