@@ -102,6 +102,8 @@ _UNQUOTED = string.punctuation.translate({ord(mark): None for mark in "%#"}) + "
 """Characters that a ``data:`` address has unquoted: base64 would be a quarter longer."""
 _INDENTATION = re.compile(r"(?<=[{};,])\n\s*|^[ \t]+", re.MULTILINE)
 """Line ends after braces, semicolons and commas of a style sheet, and indentation; none of them stands in a string."""
+_LINE_ENDS = re.compile(r"^((?:(?!//)[^\n])*[{;,(])\n", re.MULTILINE)
+"""Lines of a module without a comment, of which the next can be the continuation."""
 _REMOVED = re.compile(r"""^[ \t]*(?://.*)?\n?|[ \t]+// [^"'`\n]*$""", re.MULTILINE)
 """Indentation, empty lines and comments, which offline modules lack; no string has several lines, and what looks like a
 comment in a string is followed by a quotation mark."""
@@ -222,13 +224,13 @@ def _modules(names: Sequence[str]) -> str:
 
 
 def _with_absolute_imports(name: str, source: str) -> str:
-    """Return a module whose imports are named as in the import map, without comments and indentation."""
+    """Return a module whose imports are named as in the import map, without comments, indentation and most line ends."""
     folder = posixpath.dirname(name)
 
     def absolute(match: re.Match[str]) -> str:
         return f'{match[1]}"dhkit/{posixpath.normpath(posixpath.join(folder, match[2]))}"'
 
-    return _IMPORT.sub(absolute, _REMOVED.sub("", source))
+    return _IMPORT.sub(absolute, _LINE_ENDS.sub(r"\1", _REMOVED.sub("", source)))
 
 
 def _json(data: Any) -> str:
