@@ -56,6 +56,7 @@ COMMANDS = {
     "equations": "equations",
     "grade": "grade",
     "check": "verify",
+    "pack": "pack",
     "bench": "bench",
     "schema": "files",
     "docs": "docs",
