@@ -95,6 +95,8 @@ NOT_CALLED = {
     "description.Mesh",
     "grading.GradeReport",
     "grading.Rubric",
+    "grading.Variant",
+    "grading.VariantKey",
     "kinematics.IKPath",
     "model.ExampleChain",
     "model.Part",

@@ -64,6 +64,7 @@ PACKAGES = (
     "control",
     "description",
     "dynamics",
+    "execution",
     "expressions",
     "grading",
     "kernels",
@@ -71,7 +72,7 @@ PACKAGES = (
     "lab",
     "model",
     "planning",
-    "execution",
+    "platforms",
     "programs",
     "report",
     "symbolic",
@@ -175,6 +176,13 @@ def comparison():
 @cache
 def grade():
     return planar().grade(g=["(m1/2 + m2)*g*l1*c1", "m2*g*l2*c2/2"])
+
+
+def varied():
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "task.toml")
+        path.write_text('robot = "planar2r"\n[variants.parameters]\nl1 = [0.3, 0.6]\n')
+        return grading.Variants.load(path)
 
 
 def hostile_grade():
@@ -407,6 +415,9 @@ VALUES = {
     grading.Marks: lambda: grading.marks(grade(), grading.Rubric()),
     grading.Note: lambda: grading.Note(grading.NoteKind.AGREES, "C", ("M", "g")),
     grading.Rubric: lambda: grading.Rubric(weights={f"A{k}": 1.0 for k in range(1, 90)}),
+    grading.Variant: lambda: varied().of("ada", 1),
+    grading.VariantKey: lambda: grading.VariantKey(Path("key"), 7, "0" * 64, {HOSTILE: {}}),
+    grading.Variants: varied,
     grading.Witness: lambda: grade().entries[1].witness,
     # kinematics
     kinematics.Boundary: lambda: kinematics.boundaries(puma().description)[0],

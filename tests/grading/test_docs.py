@@ -15,7 +15,7 @@ from dhkit.grading.answers.sheet import sheet_of
 from dhkit.grading.sheet_judge import judge_sheet
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "grading.md").read_text("utf-8")
-TASK, SHEET, STEPS, RUBRIC = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+TASK, SHEET, STEPS, RUBRIC, VARIANTS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", PAGE, re.MULTILINE)
 
 
@@ -43,6 +43,8 @@ def test_a_command_works(command, tmp_path, monkeypatch, capsys):
     for path in ("answer.toml", "submissions/ada/answer.toml", "submissions/bob.toml"):
         (tmp_path / path).write_text(SHEET)
     (tmp_path / "task.toml").write_text(TASK)
+    (tmp_path / "variants.toml").write_text(VARIANTS)
+    (tmp_path / "students.csv").write_text("student,email\nada,ada@x.org\nbob,bob@x.org\n")
     (tmp_path / "homework.m").write_text(
         "V = m1*g*l1*sin(q(1))/2 + m2*g*(l1*sin(q(1)) + l2*sin(q(1) + q(2))/2);\n"
     )

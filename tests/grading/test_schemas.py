@@ -18,6 +18,7 @@ from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.empty_sheet import template
 from dhkit.grading.marks import marks
 from dhkit.grading.schema import rubric_schema, sheet_schema, task_schema
+from dhkit.grading.variants import Variants
 from grading import test_docs, test_rubric
 
 HERE = Path(__file__).parent
@@ -60,7 +61,17 @@ h_1 = "0"
 dh = {{ convention = "standard", rows = [["pi/2", 0, "l1", 0], [0, "0", "l2", 0.0]] }}
 ik = {{ branches = [["atan2(py, px)", 1]] }}
 """
-WHOLE = {"sheet": SHEET, "task": TASK, "rubric": RUBRIC}
+VARIED_TASK = f"""{TASK}
+[variants]
+robots = ["planar2r", "planar3r"]
+conventions = ["standard", "modified"]
+payload = [0.5, 2.5]
+digits = 3
+[variants.parameters]
+l1 = [0.3, 0.6]
+m1 = [1, 3, 0.05]
+"""
+WHOLE = {"sheet": SHEET, "task": VARIED_TASK, "rubric": RUBRIC}
 """A file of each kind with every key."""
 
 
@@ -86,6 +97,8 @@ def read_whole_task(path):
     sheet = path.with_name("answer.toml")
     sheet.write_text("answer = { V = 0 }")
     grade(sheet, ARM, task=task, explain=False)
+    if task.variants:
+        Variants.load(path)
 
 
 READERS = {"sheet": read_whole_sheet, "task": read_whole_task, "rubric": rubric_of}
@@ -288,6 +301,20 @@ BAD = [
     *(("task", old, new) for old, new in BAD_NAMES_AND_TASK),
     ("task", "[names]", 'student = "ada"\n[names]'),
     ("task", "[task]", "[answer]\nV = 0\n[task]"),
+    ("task", "robots =", "robot ="),
+    ("task", '["planar2r", "planar3r"]', "[]"),
+    ("task", '["planar2r", "planar3r"]', '"planar2r"'),
+    ("task", '["planar2r", "planar3r"]', '["planar2r", "planar2r"]'),
+    ("task", '"standard", "modified"', '"craig"'),
+    ("task", "[0.5, 2.5]", "0.5"),
+    ("task", "[0.5, 2.5]", "[0.5]"),
+    ("task", "[0.5, 2.5]", '["0.5", 2.5]'),
+    ("task", "digits = 3", "digits = 0"),
+    ("task", "digits = 3", "digits = 7"),
+    ("task", "digits = 3", "digits = 2.5"),
+    ("task", "[0.3, 0.6]", "[0.3, 0.6, 0.01, 0]"),
+    ("task", "[0.3, 0.6]", "[0.3, true]"),
+    ("task", "[0.3, 0.6]", "{ low = 0.3 }"),
     *(("sheet", old, new) for old, new in BAD_NAMES_AND_TASK + BAD_ANSWERS),
     *(("rubric", old, new) for old, new in BAD_RUBRIC),
 ]
@@ -342,6 +369,8 @@ def delete(table, key):
 def test_a_key_that_is_misspelt_or_missing_is_wrong_for_both_or_for_neither(kind, change, is_read):
     document = tomllib.loads(WHOLE[kind])
     for path in places(document):
+        if path[:2] == ("variants", "parameters") and path[2:] and change is misspell:
+            continue  # the schema does not know the robot's parameters
         if isinstance(path[-1], str):
             text = changed(document, path, change)
             assert fits(kind, text) == is_read(kind, text), path

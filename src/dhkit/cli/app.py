@@ -54,6 +54,7 @@ COMMANDS = {
     "report": "report",
     "workspace": "workspace",
     "equations": "equations",
+    "task": "task",
     "grade": "grade",
     "check": "verify",
     "pack": "pack",

@@ -34,7 +34,8 @@ from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.options import GradeOptions
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Rubric
-from dhkit.grading.sheets import find_sheets
+from dhkit.grading.sheets import Sheet, find_sheets
+from dhkit.grading.variants import VariantKey
 from dhkit.lab.assignment import Assignment, is_assignment
 from dhkit.lab.marks import find_records, lab_marks, lab_marks_csv
 
@@ -55,7 +56,8 @@ def grade(
     task: Annotated[
         Path | None,
         typer.Option(
-            help="The instructor's file: robot, [task], [names], [rubric]; or a lab's assignment (.toml)."
+            help="The instructor's file: robot, [task], [names], [rubric]; or a lab's assignment (.toml); or the key "
+            "of a task's variants, a folder."
         ),
     ] = None,
     rubric: Annotated[
@@ -124,6 +126,10 @@ def grade(
         raise DescriptionError(
             "no answer sheet; expected files or folders, --template NAME or --explain NAME"
         )
+    key = None
+    if task is not None and (task.is_dir() or task.suffix.lower() == ".json"):
+        key = VariantKey.read(task)
+        task = key.task
     delivery = Delivery("json" if json else form, feedback, output, read)
     if remark:
         used = ("remark", "sheets", "task", "rubric", "form", "json", "feedback", "read", "output")
@@ -140,6 +146,7 @@ def grade(
         isolated=isolated,
         jobs=jobs,
         seconds=seconds,
+        key=key,
     )
 
 
@@ -270,8 +277,9 @@ def grade_files(
     isolated: bool = False,
     jobs: int | None = None,
     seconds: float = 60.0,
+    key: VariantKey | None = None,
 ) -> ExitStatus:
-    """Judge sheets about their own robots, or all about one robot.
+    """Judge sheets about their own robots, all about one robot, or each about its student's variant.
 
     Parameters
     ----------
@@ -291,17 +299,26 @@ def grade_files(
         Whether a single program too is executed only where it can be isolated.
     delivery, jobs, seconds
         As in :func:`run`.
+    key
+        Key of the task's variants, which has a robot for each student.
 
     Raises
     ------
     AnswerError, DescriptionError
-        As :func:`run`, or there is no such robot, rubric or task.
+        As :func:`run`, or there is no such robot, rubric or task; or a task with variants has no key, or one robot for
+        all is given beside the key.
     IsolationError
         Programs are to be executed, and cannot be isolated.
     """
     read = None if task is None else read_task(task)
+    if key is not None and robot is not None:
+        raise AnswerError(f"--robot {robot}: {key.folder} has a robot for each student")
+    if key is None and read is not None and read.variants:
+        raise AnswerError(
+            f"{task}: has variants; expected the folder key that `dhkit task variants` wrote, with each student's robot"
+        )
     about = read_arm(robot).description if robot is not None else None
-    if about is None and read is not None and task is not None and read.robot:
+    if about is None and key is None and read is not None and task is not None and read.robot:
         about = robot_of(read, task.parent)
     is_single = len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
     if rubric is None and read is not None and read.rubric:
@@ -316,15 +333,23 @@ def grade_files(
     own_files = [
         path for path in (rubric, task, Path(robot) if robot else None) if path is not None
     ]
+    if key is not None:
+        own_files.append(key.folder)
     isolation = None
     if execute:
         packages = read.task.packages if read is not None else ()
         name = sheets[0].name if not are_several else "the sheets' programs"
         isolation = isolation_for(name, isolated or are_several, [*own_files, *sheets], packages)
     options = GradeOptions(task=read, seed=seed, execute=isolation is not None, isolation=isolation)
+
+    def judge(path: Path) -> GradeReport:
+        subject = about if key is None else key.robot_of(students[path])
+        return judge_sheet(path, subject, chosen, options=options)
+
+    students = {} if key is None else _students(find_sheets(sheets, own_files), key)
     return run(
         sheets,
-        lambda path: judge_sheet(path, about, chosen, options=options),
+        judge,
         chosen,
         delivery,
         exclude=own_files,
@@ -332,6 +357,19 @@ def grade_files(
         jobs=jobs,
         seconds=seconds,
     )
+
+
+def _students(sheets: Sequence[Sheet], key: VariantKey) -> dict[Path, str]:
+    """Return the student of each sheet by its file: the name of a single file counts, else that of its folder."""
+    students = {}
+    for sheet in sheets:
+        names = (
+            (sheet.student,)
+            if sheet.student
+            else (sheet.path.stem, sheet.path.absolute().parent.name)
+        )
+        students[sheet.path] = next((name for name in names if name in key), names[0])
+    return students
 
 
 def _rubric_from(data: Mapping[str, Any], path: Path | None) -> Rubric:

@@ -7,6 +7,7 @@ from dhkit.grading.marks import Mark, Marks, marks
 from dhkit.grading.options import GradeOptions
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.rubric import Credit, Rubric
+from dhkit.grading.variants import Variant, VariantKey, Variants
 
 __all__ = [
     "LIBRARY",
@@ -20,6 +21,9 @@ __all__ = [
     "Note",
     "NoteKind",
     "Rubric",
+    "Variant",
+    "VariantKey",
+    "Variants",
     "Verdict",
     "Witness",
     "grade",

@@ -23,6 +23,14 @@ class Bounds:
     rubric_bytes: int = 100_000
     """Size of a rubric."""
 
+    # Variants.
+    varied_parameters: int = 30
+    """Parameters, and robots, that a task lets vary: their numbers are compared in pairs."""
+    students_bytes: int = 10_000_000
+    """Size of a list of students: a course system's table has many columns."""
+    key_bytes: int = 50_000_000
+    """Size of the key of a task's variants: some hundred bytes for a student."""
+
     # Reports.
     report_bytes: int = 20_000_000
     """Size of a report that is accepted from a process."""

@@ -18,18 +18,21 @@ from dhkit.grading.answers.sheet import (
     JACOBIAN_ROWS,
     KEYS,
     QUANTITY,
+    VARIANT_KEYS,
     quantity_names,
     shape_of,
 )
+from dhkit.grading.bounds import BOUNDS as BORDER
 from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.rubric import WEIGHED, Rubric
+from dhkit.grading.variants.variants import MOST_DIGITS, USUAL_DIGITS
 
 Schema: TypeAlias = dict[str, Any]
 """A JSON Schema, or a part of one."""
 _ENTRY: Schema = {"type": ["string", "number"]}
 """A formula as text, or a number."""
 _ANSWER = {"$ref": "#/$defs/Answer"}
-_MEANINGS = {
+MEANINGS = {
     "M": "Mass matrix M(q), n rows of n: kg m^2 of revolute joints, kg of prismatic ones.",
     "C": "Matrix C(q, qd) of Coriolis and centrifugal terms, n rows of n; it is judged by C qd.",
     "h": "Coriolis and centrifugal torques C(q, qd) qd, n entries: N m and N.",
@@ -90,6 +93,7 @@ def _properties() -> Schema:
             "$ref": "#/$defs/Rubric",
             "description": "Weights of the answers, unless --rubric says it; a sheet's own counts where it is alone.",
         },
+        "variants": _variants(),
         "q": names
         | {
             "description": "Names of the joint variables (rad, m), one a joint; q1 ... qn unless given."
@@ -205,6 +209,49 @@ def _properties() -> Schema:
     return keys | tables
 
 
+def _variants() -> Schema:
+    """Return the schema of what varies between students; its keys are those of ``VARIANT_KEYS``."""
+    numbers = {
+        "type": "array",
+        "description": "[lowest, highest] or [lowest, highest, step]: SI units and rad.",
+        "items": {"type": "number"},
+        "minItems": 2,
+        "maxItems": 3,
+    }
+    texts = {
+        "type": "array",
+        "items": {"type": "string"},
+        "minItems": 1,
+        "maxItems": BORDER.varied_parameters,
+        "uniqueItems": True,
+    }
+    properties = {
+        "parameters": {
+            "type": "object",
+            "description": "Ranges of the robot's parameters, by name.",
+            "additionalProperties": numbers,
+            "maxProperties": BORDER.varied_parameters,
+        },
+        "robots": texts
+        | {"description": "Robots of which each student gets one; the task's robot unless given."},
+        "conventions": texts
+        | {
+            "description": "Conventions of which each student gets one; the robot file's unless given.",
+            "items": {"enum": [*CHOICES["convention"]]},
+        },
+        "payload": numbers
+        | {"description": "Range of the mass of a point at the tool, kg; a parameter mp."},
+        "digits": {
+            "type": "integer",
+            "minimum": 1,
+            "maximum": MOST_DIGITS,
+            "default": USUAL_DIGITS,
+            "description": "Significant digits of a range's larger end, which give the step of the range.",
+        },
+    }
+    return _table(VARIANT_KEYS, properties, "What varies between students (`dhkit task variants`).")
+
+
 def _table(keys: Sequence[str], properties: Schema, description: str) -> Schema:
     known = {key: properties[key] for key in keys}
     return {
@@ -217,7 +264,7 @@ def _table(keys: Sequence[str], properties: Schema, description: str) -> Schema:
 
 def _answer(**tables: Schema) -> Schema:
     """Return the schema of the answers: whole quantities, single entries, or tables."""
-    whole = {name: _ANSWER | {"description": _MEANINGS[name]} for name in quantity_names(0)}
+    whole = {name: _ANSWER | {"description": MEANINGS[name]} for name in quantity_names(0)}
     names = {name: name for name in whole} | ALIASES | SMALL_HEADS
     heads = "|".join(name for name, quantity in names.items() if shape_of(quantity, 1))
     element = rf"(?:{heads})[_{{]*[1-9][0-9_,{{}}]*|A[1-9][0-9_,{{}}]{{2,}}"

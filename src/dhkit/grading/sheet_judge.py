@@ -123,7 +123,7 @@ def judge_sheet(
     return GradeReport(
         robot=description.name,
         digest=description.digest,
-        version=_version(),
+        version=package_version(),
         entries=tuple(entries),
         diagnosis=tuple(diagnosis),
         notes=tuple(notes),
@@ -137,7 +137,8 @@ def judge_sheet(
     )
 
 
-def _version() -> str:
+def package_version() -> str:
+    """Return dhkit's version as it is installed; unknown where it is run from a folder of sources."""
     try:
         return version("dhkit-robotics")
     except PackageNotFoundError:

@@ -31,7 +31,7 @@ FORMAT = 1
 
 KEYS = {
     "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
-    "task file": ("format", "robot", "names", "task", "rubric"),
+    "task file": ("format", "robot", "names", "task", "rubric", "variants"),
     "names": ("q", "qd", "qdd", "angles", "parameters", "state"),
     "task": (
         "friction",
@@ -50,6 +50,9 @@ KEYS = {
     "step": ("joint", "equation", "solution"),
 }
 """Keys that a document, and each table in it, may have. No key stands in two tables with two meanings."""
+
+VARIANT_KEYS = ("parameters", "robots", "conventions", "payload", "digits")
+"""Keys of a task's table of variants, which :class:`dhkit.grading.variants.Variants` reads."""
 
 CHOICES = {
     "angles": ("relative", "absolute"),
@@ -221,6 +224,7 @@ def _sheet(data: Mapping[str, object], checker: _Checker, known: Sequence[str]) 
         checker.table(data, "rubric", ""),
         checker.text(data, "student", ""),
         checker.file,
+        variants=checker.table(data, "variants", ""),
     )
 
 

@@ -163,6 +163,8 @@ class AnswerSheet:
         Remarks on how a program or a document was read, each with its line.
     left_out
         Statements that were not read as answers, each with its line.
+    variants
+        A task's table of variants, as it was typed.
     """
 
     robot: str = ""
@@ -177,3 +179,4 @@ class AnswerSheet:
     file: str = "answers"
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    variants: Mapping[str, object] = field(default_factory=dict)
