@@ -214,3 +214,10 @@ def test_a_controller_by_its_name_has_the_gains_that_were_asked_for():
         ValueError, match="controller is 'bang'; expected one of pd, pid, pd-gravity"
     ):
         make_controller("bang", RODS)
+
+
+def test_controllers_in_a_list_are_refused_with_what_is_expected():
+    robot = library_robot("planar2r")
+    motion = quintic(robot, [0.0, 0.3], [1.2, -0.8], duration=1.5)
+    with pytest.raises(TypeError, match="found PID in a list; expected names, or a mapping"):
+        compare(robot, motion, [PID.tuned(robot)])

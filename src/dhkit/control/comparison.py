@@ -257,6 +257,12 @@ def compare(
         chosen = controllers
     else:
         chosen = {name: name for name in (CONTROLLERS if controllers is None else controllers)}
+        for name in chosen:
+            if not isinstance(name, str):
+                raise TypeError(
+                    f"controllers: found {type(name).__name__} in a list; expected names, or a mapping such as "
+                    '{"mine": controller}'
+                )
     for given in chosen.values():
         if isinstance(given, str):
             _require_known(given)
