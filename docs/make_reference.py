@@ -31,6 +31,8 @@ PACKAGES = {
     "viewer": "Pictures and pages",
     "lab": "The lab",
     "report": "Reports",
+    "platforms": "Teaching platforms",
+    "scale": "Many processes or machines",
     "errors": "Errors",
     "expressions": "Expressions",
     "kernels": "Kernels",

@@ -48,6 +48,7 @@ OTHER_COMMANDS = {"make", "pip", "git", "source", "ros2", "colcon", "octave", "g
 SLOW_PAGES = {
     "docs/report.md",
     "docs/how-to/identify-parameters.md",
+    "docs/how-to/scale.md",
     "docs/how-to/without-pinocchio.md",
     "docs/tutorials/08-trajectories.md",
     "docs/tutorials/09-control.md",

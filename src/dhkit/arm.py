@@ -1152,7 +1152,8 @@ class Arm:
         Returns
         -------
         Workspace
-            Positions (samples, 3), m, and estimates of area or volume; it is sampled, not proved.
+            Positions, m, of the first 4,194,304 samples at most, counts and extents of all, and estimates of area or
+            volume; it is sampled, not proved.
 
         Raises
         ------

@@ -1,6 +1,7 @@
 """Laws of sampled workspaces: points inside the reach, areas that are known, seeds, and arms without limits."""
 
 import pickle
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -10,7 +11,12 @@ from dhkit.description import from_dh, library_robot, pose, robots, with_base
 from dhkit.description.robot_file import from_toml
 from dhkit.kinematics import forward_kinematics
 from dhkit.kinematics.manipulability import manipulability
-from dhkit.kinematics.workspace import CHUNK, occupancy, workspace
+from dhkit.kinematics.workspace import (
+    CHUNK,
+    Grid,
+    distributed_workspace,
+    workspace,
+)
 
 ROUNDING = 1e-12  # m
 RARE = 1e-3  # m: how near 100,000 random elbows come to stretched, and to folded
@@ -148,7 +154,15 @@ def test_fewer_samples_are_the_first_of_more_whatever_the_chunks():
     many = workspace(arm, CHUNK + 100, progress=lambda done, total: calls.append((done, total)))
     few = workspace(arm, 200)
     assert np.array_equal(many.positions[:200], few.positions)
-    assert calls == [(CHUNK, CHUNK + 100), (CHUNK + 100, CHUNK + 100)]
+    # A first pass over the two chunks measures the box, a quarter of the work, and a second one counts.
+    total = CHUNK + 100
+    assert [done for done, _ in calls] == [
+        CHUNK // 4,
+        total // 4,
+        (total + 3 * CHUNK) // 4,
+        total,
+    ]
+    assert {whole for _, whole in calls} == {total}
     # The last chunk is worked on like the first.
     rng = np.random.default_rng(0)
     q = many.lower + (many.upper - many.lower) * rng.random((CHUNK + 100, 2))
@@ -171,25 +185,91 @@ def test_radii_are_measured_from_the_first_axis_in_either_convention():
     assert workspace(standard, FEW).radii == pytest.approx((0.5, 0.5), abs=ROUNDING)
 
 
-def test_a_grid_finds_its_points_again():
-    rng = np.random.default_rng(0)
-    for points in (
-        rng.normal(size=(500, 3)),
-        rng.normal(size=(500, 2)) @ rng.normal(size=(2, 3)) + 1,
-    ):
-        grid = occupancy(points, 0.2, 1e-9)
-        cells = np.floor((points - grid.origin) @ grid.axes.T / grid.edge + 1e-9).astype(int)
-        counts = np.zeros_like(grid.counts)
-        np.add.at(counts, tuple(np.minimum(cells, np.array(counts.shape) - 1).T), 1)
-        assert np.array_equal(counts, grid.counts)
-        assert np.allclose(grid.axes @ grid.axes.T, np.eye(len(grid.axes)), rtol=0, atol=1e-14)
+@pytest.mark.parametrize("samples", [FEW, CHUNK + FEW])
+@pytest.mark.parametrize(
+    "arm",
+    [
+        library_robot("puma560"),
+        with_base(planar(1, 0.5), pose((0.1, 0.2, 0.3), euler=(0.3, 0.4, 0.5))),
+        from_dh([(0, 0.3, 0.2, "pi/2")], kinds="P"),
+    ],
+)
+def test_a_grid_finds_its_points_again(arm, samples):
+    space = workspace(arm, samples)
+    grid = space.grid
+    cells = np.floor((space.positions - grid.origin) @ grid.axes.T / grid.edge + 1e-9).astype(int)
+    cells = tuple(np.clip(cells, 0, np.array(grid.counts.shape) - 1).T)
+    counts = np.zeros_like(grid.counts)
+    np.add.at(counts, cells, 1)
+    # Rounding moves a point at the border between two cells.
+    assert np.abs(counts - grid.counts).sum() <= 4
+    assert np.allclose(grid.axes @ grid.axes.T, np.eye(len(grid.axes)), rtol=0, atol=1e-14)
+    best = np.full(counts.shape, -np.inf)
+    np.maximum.at(best, cells, space.manipulability)
+    assert np.array_equal(np.isnan(grid.manipulability), grid.counts == 0)
+    assert np.mean(best[grid.counts > 0] == grid.manipulability[grid.counts > 0]) > 0.99
 
 
 def test_the_estimate_of_a_full_box_is_between_its_inner_and_its_outer_cells():
-    points = np.stack(np.meshgrid(*[np.arange(6) + 0.5] * 3), axis=-1).reshape(-1, 3)
-    estimate = occupancy(points, 1.0).estimate
-    # Cells of 1 m over a box of 5 m.
+    ones = np.ones((5, 5, 5), dtype=np.int64)
+    estimate = Grid(np.zeros(3), np.eye(3), 1.0, ones, ones.astype(float)).estimate
     assert (estimate.value, estimate.margin) == ((5**3 + 3**3) / 2, (5**3 - 3**3) / 2)
+
+
+def test_quantiles_are_those_of_the_samples_but_for_the_bins():
+    space = workspace(library_robot("puma560"), CHUNK + FEW)
+    for share in (0.0, 0.05, 0.5, 0.95, 1.0):
+        exact = np.quantile(space.manipulability, share, method="inverted_cdf")
+        assert space.quantile(share) == pytest.approx(exact, rel=1 / 8192)
+    assert workspace(from_dh([(0, 0.5, 0, 0)]), 10).quantile(0.5) == 0.0  # a point
+    assert workspace(from_dh([(0, 0, 0, 0)], kinds="P"), 10).quantile(0.5) == 1.0
+
+
+def assert_same(one, other):
+    """Hold all arrays of two workspaces to the same digits."""
+    for name in ("positions", "manipulability", "bounds", "best", "histogram"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    assert (one.distances, one.radii) == (other.distances, other.radii)
+    assert one.largest_manipulability == other.largest_manipulability
+    for mine, theirs in [(one.grid, other.grid), *zip(one.maps, other.maps, strict=True)]:
+        assert mine.edge == theirs.edge
+        assert np.array_equal(mine.manipulability, theirs.manipulability, equal_nan=True)
+    assert np.array_equal(one.grid.counts, other.grid.counts)
+
+
+@pytest.mark.parametrize("longest", [1, 3, 100])
+def test_no_digit_depends_on_the_runs_of_chunks_or_on_their_order(longest):
+    arm = library_robot("planar2r")
+    samples = 6 * CHUNK + 17
+
+    def in_any_order(function, chunks):
+        rng = np.random.default_rng(longest)
+        runs = []
+        while chunks:
+            size = rng.integers(1, longest + 1)
+            runs.append(chunks[:size])
+            chunks = chunks[size:]
+        for k in rng.permutation(len(runs)):
+            yield runs[k], pickle.loads(pickle.dumps(function))(runs[k])
+
+    other = distributed_workspace(
+        arm, samples, 2, edge=None, threads=1, progress=None, distribute=in_any_order
+    )
+    assert_same(workspace(arm, samples, 2), other)
+
+
+def test_what_is_known_of_samples_beyond_those_kept(monkeypatch):
+    arm = library_robot("planar2r")
+    many = workspace(arm, 3 * CHUNK)
+    module = import_module("dhkit.kinematics.workspace")  # the package's attribute is the function
+    monkeypatch.setattr(module, "KEPT_CHUNKS", 1)
+    few = workspace(arm, 3 * CHUNK)
+    assert len(few.positions) == len(few.manipulability) == CHUNK
+    assert np.array_equal(few.positions, many.positions[:CHUNK])
+    assert few.samples == few.grid.counts.sum() == few.histogram.sum() == 3 * CHUNK
+    assert few.largest_manipulability == many.manipulability.max()
+    assert np.array_equal(few.bounds, [many.positions.min(axis=0), many.positions.max(axis=0)])
+    assert few.radii == many.radii
 
 
 def test_a_workspace_travels():

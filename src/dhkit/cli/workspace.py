@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,39 +18,82 @@ from dhkit.cli.units import joint_entry
 from dhkit.errors import ModelError
 from dhkit.kinematics.manipulability import velocity_ellipsoid
 from dhkit.kinematics.singularities import Singularities, singularities
-from dhkit.kinematics.workspace import Workspace, workspace as sample
+from dhkit.kinematics.workspace import Workspace
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+MAX_SAMPLES = 10**12
 MAX_POINTS = 12_000
 """Most points on the page: more are slow without a graphics processor."""
 
 app = typer.Typer(rich_markup_mode=None)
 
 
+def whole_number(text: object) -> int:
+    """Return a number of samples: digits, or such as 1e9.
+
+    Raises
+    ------
+    typer.BadParameter
+        Not a whole number from 1 to 10^12.
+    """
+    try:
+        number = Fraction(str(text))
+    except (ValueError, ZeroDivisionError):
+        number = Fraction(0)
+    if number.denominator != 1 or not 1 <= number <= MAX_SAMPLES:
+        raise typer.BadParameter(
+            f"{text!r} is not a whole number from 1 to {MAX_SAMPLES:.0e}, such as 100000 or 1e9"
+        )
+    return int(number)
+
+
 @app.command()
 def workspace(
     robot: Robot,
     samples: Annotated[
-        int, typer.Option(min=1, max=10_000_000, help="Number of random states.")
+        int,
+        typer.Option(
+            parser=whole_number, metavar="NUMBER", help="Number of random states, such as 1e9."
+        ),
     ] = 100_000,
     seed: Seed = 0,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder to write; default: out/NAME.")
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Scheduler of dask whose workers compute: tcp://HOST:PORT; local, or local:4 for four processes here.",
+        ),
+    ] = None,
+    zarr: Annotated[
+        Path | None,
+        typer.Option(help="Zarr group to write: samples and best manipulability in each cell."),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
+    from dhkit.scale import check_zarr_place, connected, save_workspace, workspace as sample
     from dhkit.viewer import plot
 
     arm = load_arm(robot)
     folder = output_folder(output, arm.name)
+    if zarr is not None:
+        check_zarr_place(zarr)
     with ProgressBar("sampling") as bar:
-        space = sample(arm.description, samples, seed, progress=bar.show)
+        if scheduler is None:
+            space = arm.workspace(samples, seed, progress=bar.show)
+        else:
+            with connected(scheduler) as client:
+                space = sample(client, arm, samples, seed, progress=bar.show)
     folder.mkdir(parents=True, exist_ok=True)
     files = [
         write_figure(plot(space), folder / "workspace.png"),
         _page(arm, space, folder / "workspace.html"),
     ]
+    if zarr is not None:
+        files.append(save_workspace(space, zarr))
     if json:
         print_json(_facts(arm, space) | {"files": [str(file) for file in files]})
         return
@@ -81,7 +125,7 @@ def _print(arm: Arm, space: Workspace) -> None:
     say(f"manipulability (translational, SI): {shares}")
     q = ", ".join(_value(arm, i, x) for i, x in enumerate(space.best))
     place = ", ".join(f"{x + 0.0:.4f}" for x in arm.fk(space.best)[:3, 3])
-    say(f"best {space.manipulability.max():.4g} with the tool at ({place}) m, joints ({q})")
+    say(f"best {space.largest_manipulability:.4g} with the tool at ({place}) m, joints ({q})")
     singular = _singularities(arm)
     if singular is not None:
         say("\nsingular where, limits aside")
@@ -111,7 +155,7 @@ def _size(space: Workspace) -> str:
 
 
 def _quantiles(space: Workspace) -> list[float]:
-    return [float(w) for w in np.quantile(space.manipulability, QUANTILES)]
+    return [space.quantile(share) for share in QUANTILES]
 
 
 def _value(arm: Arm, i: int, x: float) -> str:
@@ -139,7 +183,7 @@ def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
             f"{q:.0%}": w for q, w in zip(QUANTILES, _quantiles(space), strict=True)
         },
         "best": {
-            "manipulability": float(space.manipulability.max()),
+            "manipulability": space.largest_manipulability,
             **joint_entry(arm, "q", space.best),
             "xyz_m": arm.fk(space.best)[:3, 3].tolist(),
         },
@@ -179,7 +223,8 @@ def _page(arm: Arm, space: Workspace, path: Path) -> Path:
 
 def _shown_points(space: Workspace) -> NDArray[np.intp]:
     """Return the points to show: of a volume only those with y above frame 0's, behind the arm, to see inside."""
+    kept = len(space.positions)
     behind = np.flatnonzero(space.positions[:, 1] >= space.description.numbers.T_world_base[1, 3])
-    if space.grid is None or len(space.grid.axes) < 3 or len(behind) < space.samples / 10:
-        return np.arange(min(MAX_POINTS, space.samples), dtype=np.intp)
+    if space.grid is None or len(space.grid.axes) < 3 or len(behind) < kept / 10:
+        return np.arange(min(MAX_POINTS, kept), dtype=np.intp)
     return behind[:MAX_POINTS]

@@ -345,8 +345,6 @@ def _volume(J: Array, rank: int) -> Array:
     Its square is the sum of the squares of all minors of that size (Cauchy and Binet), which, unlike det(J J^T),
     loses no digits near singularities.
     """
-    columns = np.ascontiguousarray(np.moveaxis(J, -1, 0))  # (n, ..., 3)
-    n = len(columns)
     if rank == 0:
         return 0.0 * J[..., 0, 0]
 
@@ -354,13 +352,18 @@ def _volume(J: Array, rank: int) -> Array:
     if rank == 1:
         return np.asarray(np.linalg.norm(J, axis=(-2, -1)))
 
-    # The minors of columns a, b, c: the entries of a x b for 2 x 2, and (a x b) . c for 3 x 3.
+    # The minors of columns a, b, c: the entries of a x b for 2 x 2, and (a x b) . c for 3 x 3. Components are arrays of
+    # their own, contiguous, which takes a quarter of the time of np.cross.
+    x, y, z = np.ascontiguousarray(np.moveaxis(J, (-2, -1), (0, 1)))  # (n, ...) each
+    n = len(x)
     squares = np.zeros(J.shape[:-2])
     for i, j in combinations(range(n), 2):
-        normal = np.cross(columns[i], columns[j])
+        normal_x = y[i] * z[j] - z[i] * y[j]
+        normal_y = z[i] * x[j] - x[i] * z[j]
+        normal_z = x[i] * y[j] - y[i] * x[j]
         if rank == 2:
-            squares += np.sum(normal**2, axis=-1)
+            squares += normal_x**2 + normal_y**2 + normal_z**2
             continue
         for k in range(j + 1, n):
-            squares += np.sum(normal * columns[k], axis=-1) ** 2
+            squares += (normal_x * x[k] + normal_y * y[k] + normal_z * z[k]) ** 2
     return np.sqrt(squares)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +19,7 @@ from dhkit.description import (
 )
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
-from dhkit.kinematics.workspace import Workspace, first_axis
+from dhkit.kinematics.workspace import PIXEL_MARGIN, FlatMap, Projection, Workspace
 from dhkit.viewer.diagrams import style_axes
 from dhkit.viewer.figures import LINK_COLOR, plot, set_space_limits, skeleton, space_axes
 from dhkit.viewer.notebook import new_figure
@@ -36,12 +35,6 @@ _ELLIPSOID_COLOR = "#d9480f"
 _BOUNDARY_COLOR = "#d9480f"
 _BOUNDARY_STYLES = {"outer": "--", "inner": ":", "shoulder": "-."}
 """Line styles of boundaries, by name."""
-_MAX_PIXELS = 160
-"""Most pixels along the longer side of a view."""
-_SAMPLES_PER_PIXEL = 12
-"""Samples for each pixel of the box around them: with fewer, the largest value in a pixel is noise."""
-_PIXEL_MARGIN = 2
-"""Pixels that are left free at the edges of a view; pixels are smoothed over one fewer to each side."""
 _TICK_MARGIN = 0.8
 """Width of a view's tick labels and axis label, inches."""
 _LEGEND_ROW_HEIGHT = 0.25
@@ -59,32 +52,23 @@ _MESH_LINES = 33
 
 
 @dataclass(frozen=True, eq=False)
-class _Plane:
-    """A flat view of points in space."""
+class _Panel:
+    """A flat map of the workspace as it is drawn: smoothed, with a title and labels."""
 
     title: str
     labels: tuple[str, str]
-    flatten: Callable[[Array], Array]
-    """Maps points in the world, shape (..., 3), m, to points of the view, shape (..., 2), m."""
-    is_along_axis: bool = True
-    """Whether a surface about axis 1 is seen as its circle; in a section it is a curve."""
-
-    def border(self, boundary: Boundary) -> Array:
-        """Return the line of a boundary in the view, shape (k, 2), m, NaN between its pieces."""
-        return self.flatten(boundary.circle if self.is_along_axis else boundary.section)
-
-
-@dataclass(frozen=True, eq=False)
-class _Pixels:
-    """The best manipulability in a flat view, in pixels."""
-
-    plane: _Plane
+    projection: Projection
     corner: Array
     """Corner of pixel (0, 0), shape (2,), m."""
     edge: float
     """Edge of a pixel, m."""
     best: Array
     """The best manipulability in each pixel, NaN where no sample is, shape (nx, ny)."""
+
+    def border(self, boundary: Boundary) -> Array:
+        """Return the line of a boundary in the view, shape (k, 2), m, NaN between its pieces."""
+        # Along axis 1 a surface about that axis is seen as its circle; in a section it is a curve.
+        return self.projection(boundary.section if self.projection.is_section else boundary.circle)
 
     def shape(self, points: Array) -> tuple[float, float]:
         """Return the width and height of the view with points (k, 2) in it, m."""
@@ -102,9 +86,9 @@ class _Pixels:
         centres = x[:-1] + self.edge / 2, y[:-1] + self.edge / 2
         reached = np.isfinite(self.best).astype(float).T
         axes.contour(*centres, reached, levels=[0.5], colors=LINK_COLOR, linewidths=1.2)
-        axes.set(xlabel=self.plane.labels[0], aspect="equal")
-        style_axes(axes, self.plane.labels[1])
-        axes.set_title(self.plane.title, fontsize=10)
+        axes.set(xlabel=self.labels[0], aspect="equal")
+        style_axes(axes, self.labels[1])
+        axes.set_title(self.title, fontsize=10)
         axes.set_axisbelow(True)
         return image
 
@@ -135,16 +119,13 @@ def plot_workspace(workspace: Workspace) -> Figure:
     >>> figure = plot_workspace(workspace(library_robot("planar2r"), samples=2000))
     """
     description = workspace.description
-    reaches = [_reach(plane, workspace) for plane in _planes(workspace)]
+    panels = _panels(workspace)
     line = _arm_in_pieces(description, first_configuration(description))
     best = world_to_tool(description, workspace.best)[:3, 3]
     borders = boundaries(description)
-    drawn = [
-        np.vstack([reach.plane.flatten(line), *map(reach.plane.border, borders)])
-        for reach in reaches
-    ]
+    drawn = [np.vstack([panel.projection(line), *map(panel.border, borders)]) for panel in panels]
     widths, heights = np.transpose(
-        [reach.shape(points) for reach, points in zip(reaches, drawn, strict=True)]
+        [panel.shape(points) for panel, points in zip(panels, drawn, strict=True)]
     )
     scale = min(_MAX_SIZE[0] / widths.sum(), _MAX_SIZE[1] / heights.max())
     columns = scale * widths + _TICK_MARGIN
@@ -154,12 +135,12 @@ def plot_workspace(workspace: Workspace) -> Figure:
         max(scale * heights.max(), 1.5) + 1.6 + _LEGEND_ROW_HEIGHT * rows,
     )
     figure = new_figure(figsize=size, layout="constrained")
-    axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
-    for ax, reach in zip(axes, reaches, strict=True):
-        image = reach.draw(ax, float(workspace.manipulability.max()))
-        _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
+    axes = figure.subplots(1, len(panels), width_ratios=columns, squeeze=False)[0]
+    for ax, panel in zip(axes, panels, strict=True):
+        image = panel.draw(ax, workspace.largest_manipulability)
+        _draw_arm(ax, panel.projection(line), panel.projection(best))
         for boundary in borders:
-            border = reach.plane.border(boundary)
+            border = panel.border(boundary)
             dashes = _BOUNDARY_STYLES[boundary.name]
             ax.plot(*border.T, dashes, color=_BOUNDARY_COLOR, lw=1.3, zorder=1.9)  # below the arm
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
@@ -244,60 +225,46 @@ def _(value: Ellipsoid) -> Figure:
     return figure
 
 
-def _planes(workspace: Workspace) -> list[_Plane]:
-    description = workspace.description
-    grid = workspace.grid
-    if grid is not None and len(grid.axes) == 2:
-        return [_in_plane(grid.axes)]
-    T = first_axis(description)
-    if not description.joints[0].is_revolute:
-        return [
-            _Plane("from the side", ("x [m]", "z [m]"), lambda points: points[..., [0, 2]]),
-            _Plane("from above", ("x [m]", "y [m]"), lambda points: points[..., [0, 1]]),
+def _panels(workspace: Workspace) -> list[_Panel]:
+    """Return the flat maps of a workspace, smoothed over neighbouring pixels, with their titles and labels."""
+    if len(workspace.maps) == 1:
+        names = _in_plane(workspace.maps[0].projection.axes)
+    elif workspace.maps[0].projection.is_section:
+        names = [
+            (
+                "section, all turns of the first joint in one",
+                ("distance from axis 1 [m]", "height [m]"),
+            ),
+            ("along axis 1", ("x₀ [m]", "y₀ [m]")),
         ]
-
-    def local(points: Array) -> Array:
-        return np.asarray((points - T[:3, 3]) @ T[:3, :3])
-
-    def section(points: Array) -> Array:
-        x, y, z = np.moveaxis(local(points), -1, 0)
-        return np.stack([np.hypot(x, y), z], axis=-1)
-
-    title = "section, all turns of the first joint in one"
-    labels = ("distance from axis 1 [m]", "height [m]")
+    else:
+        names = [
+            ("from the side", ("x [m]", "z [m]")),
+            ("from above", ("x [m]", "y [m]")),
+        ]
     return [
-        _Plane(title, labels, section, is_along_axis=False),
-        _Plane("along axis 1", ("x₀ [m]", "y₀ [m]"), lambda points: local(points)[..., :2]),
+        _Panel(title, labels, flat.projection, flat.corner, flat.edge, _smoothed(flat))
+        for (title, labels), flat in zip(names, workspace.maps, strict=True)
     ]
 
 
-def _in_plane(axes: Array) -> _Plane:
-    """Return the view of a plane; its axes are named where they are the world's."""
-    names = [
+def _in_plane(axes: Array) -> list[tuple[str, tuple[str, str]]]:
+    """Return the title and the labels of the view of a plane; its axes are named where they are the world's."""
+    x, y = (
         f"{'xyz'[int(np.argmax(axis))]} [m]" if axis.max() == 1 else "along the plane [m]"
         for axis in axes
-    ]
-    return _Plane("", (names[0], names[1]), lambda points: points @ axes.T)
+    )
+    return [("", (x, y))]
 
 
-def _reach(plane: _Plane, workspace: Workspace) -> _Pixels:
-    """Return the best manipulability in each pixel of a view, smoothed over its neighbours."""
+def _smoothed(flat: FlatMap) -> Array:
+    """Return the best manipulability in each pixel and its neighbours, NaN where no sample is, shape (nx, ny)."""
     from scipy.ndimage import binary_closing, maximum_filter
 
-    places = plane.flatten(workspace.positions)
-    low = places.min(axis=0)
-    high = places.max(axis=0)
-    span = float((high - low).max()) or scene_size(workspace.description)
-    edge = span / float(np.clip(np.sqrt(len(places) / _SAMPLES_PER_PIXEL), 8, _MAX_PIXELS))
-    counts = np.ceil((high - low) / edge).astype(int) + 2 * _PIXEL_MARGIN
-    corner = (low + high - edge * counts) / 2
-    best = np.full(tuple(counts), -np.inf)
-    np.maximum.at(best, tuple(((places - corner) / edge).astype(int).T), workspace.manipulability)
     # A single pixel has too few samples for the best of them to be smooth, and some have none.
-    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=_PIXEL_MARGIN - 1)
-    return _Pixels(
-        plane, corner, edge, np.where(reached, maximum_filter(best, 2 * _PIXEL_MARGIN - 1), np.nan)
-    )
+    best = np.nan_to_num(flat.manipulability, nan=-np.inf)
+    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=PIXEL_MARGIN - 1)
+    return np.where(reached, maximum_filter(best, 2 * PIXEL_MARGIN - 1), np.nan)
 
 
 def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
