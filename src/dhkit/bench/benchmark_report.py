@@ -13,6 +13,7 @@ from dhkit.bench.derivations import Derivation, Operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
+from dhkit.symbolic.equations.latex_document import escaped
 
 BATCH = 100_000
 """Items of the batch that requirements are about."""
@@ -250,6 +251,13 @@ class Report:
             parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
         return "\n".join([*parts, self.meaning, ""])
 
+    def latex(self) -> str:
+        """Return the tables as LaTeX for a document that uses booktabs; the machine's facts are comments."""
+        lines = [f"% {self.title}", *(f"% {fact}" for fact in self.machine.facts)]
+        for heading, columns, cells in self._shown:
+            lines += ["", f"% {heading}", *_latex_table(columns, cells)]
+        return "\n".join([*lines, "", f"% {self.meaning}", ""])
+
     def __str__(self) -> str:
         parts = [self.title, *(f"  {fact}" for fact in self.machine.facts), ""]
         for heading, columns, cells in self._shown:
@@ -456,6 +464,20 @@ def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> l
         escaped = [cell.replace("|", "\\|") for cell in line]
         written.append(f"| {' | '.join(escaped)} |")
     return written
+
+
+def _latex_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table in LaTeX."""
+    rows = [" & ".join(map(escaped, line)) + r" \\" for line in cells]
+    return [
+        rf"\begin{{tabular}}{{{'l' * len(columns)}}}",
+        r"\toprule",
+        " & ".join(map(escaped, columns)) + r" \\",
+        r"\midrule",
+        *rows,
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
 
 
 def _with_lists(value: Any) -> Any:

@@ -13,6 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run_bench
 from dhkit.bench.benchmark_report import Report
+from dhkit.bench.problems import files_in, run_problems
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import Json, Seed, read_arm
 from dhkit.cli.output import print_json, say
@@ -47,7 +48,18 @@ def bench(
     ] = True,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="NAME", help="Write NAME.md and NAME.json as well."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="NAME",
+            help="Write NAME.md and NAME.json as well; of NAME.tex also a table in LaTeX.",
+        ),
+    ] = None,
+    problems: Annotated[
+        Path | None,
+        typer.Option(
+            help="Score inverse kinematics on these problems instead: a folder or a file (.json)."
+        ),
     ] = None,
     json: Json = False,
 ) -> ExitStatus:
@@ -57,6 +69,8 @@ def bench(
 
     Quantities: fk, ik, jacobian, inverse_dynamics, mass_matrix, forward_dynamics.
     """
+    if problems is not None:
+        return run_on_problems(problems, output, json=json)
     return run(
         read_arm(robot),
         quantities or QUANTITIES,
@@ -120,19 +134,42 @@ def run(
     return ExitStatus.FINE if all(outcome.ok for outcome in report.outcomes) else ExitStatus.NO
 
 
-def write(report: Report, path: Path) -> tuple[Path, Path]:
-    """Write a report as Markdown and as JSON, whatever the path's suffix; return the two files."""
-    markdown, json = _files(path)
-    write_atomically(markdown, report.markdown())
-    write_atomically(
-        json, json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
-    )
-    return markdown, json
+def run_on_problems(path: Path, output: Path | None, *, json: bool) -> ExitStatus:
+    """Score every solver on problems, and print the report; the status is NO if dhkit misses or invents a solution."""
+    files = files_in(path)
+    for file in _files(output) if output is not None else ():
+        check_place(file)
+    progress = _Progress()
+    report = run_problems(files, progress.show)
+    progress.clear()
+    if output is not None:
+        for file in write(report, output):
+            sys.stderr.write(f"dhkit: wrote {file}\n")
+    if json:
+        print_json(report.json())
+    else:
+        say(str(report))
+    are_right = all(row.is_right for row in report.rows if row.own)
+    return ExitStatus.FINE if are_right else ExitStatus.NO
 
 
-def _files(path: Path) -> tuple[Path, Path]:
-    """Return the Markdown and the JSON file of a report; the path's own suffix is replaced."""
-    return path.with_suffix(".md"), path.with_suffix(".json")
+def write(report: Report, path: Path) -> tuple[Path, ...]:
+    """Write a report as Markdown and as JSON, and as LaTeX for a path that ends in ``.tex``; return the files."""
+    forms = (report.markdown, lambda: _as_json(report), report.latex)
+    files = _files(path)
+    for file, form in zip(files, forms, strict=False):
+        write_atomically(file, form())
+    return files
+
+
+def _as_json(report: Report) -> str:
+    return json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def _files(path: Path) -> tuple[Path, ...]:
+    """Return the Markdown, the JSON and, for a path that ends in ``.tex``, the LaTeX file of a report."""
+    latex = (path,) if path.suffix.lower() == ".tex" else ()
+    return path.with_suffix(".md"), path.with_suffix(".json"), *latex
 
 
 class _Progress:

@@ -224,7 +224,7 @@ def _modules(names: Sequence[str]) -> str:
 
 
 def _with_absolute_imports(name: str, source: str) -> str:
-    """Return a module whose imports are named as in the import map, without comments, indentation and most line ends."""
+    """Return a module whose imports are named as in the import map, without comments, indentation, most line ends."""
     folder = posixpath.dirname(name)
 
     def absolute(match: re.Match[str]) -> str:
