@@ -12,9 +12,11 @@ import pytest
 from dhkit import Arm
 from dhkit.description import to_toml
 from dhkit.errors import AnswerError
+from dhkit.grading.variants import Variants
+from dhkit.grading.variants.key import key_files
 from dhkit.platforms import pack
 
-from .conftest import PROGRAM, RIGHT_G, TASK, M
+from .conftest import PROGRAM, RIGHT_G, TASK, WRONG_G, M
 
 # Gradescope, Autograder Specifications, "Output Format".
 GRADESCOPE_RESULTS = {
@@ -91,8 +93,8 @@ def environment():
     }
 
 
-def on_gradescope(folder, task, files):
-    """Return the results of an autograder that gets these files."""
+def on_gradescope(folder, task, files, users=()):
+    """Return the results of an autograder that gets these files, of these users."""
     archive = folder / "autograder.zip"
     pack("gradescope", task).write(archive)
     root = folder / "autograder"
@@ -104,6 +106,7 @@ def on_gradescope(folder, task, files):
     script = root / "run_autograder"
     script.write_bytes((root / "source" / "run_autograder").read_bytes())
     script.chmod(0o755)
+    (root / "submission_metadata.json").write_text(json.dumps({"id": 7, "users": list(users)}))
     for name, text in files.items():
         (root / "submission" / name).write_text(text)
     subprocess.run([script], check=True, env=environment(), cwd=folder, timeout=120)
@@ -243,3 +246,46 @@ def test_a_wheel_of_something_else_is_refused(tmp_path, task):
         pack("gradescope", task, wheel=other)
     with pytest.raises(AnswerError, match="expected gradescope, prairielearn"):
         pack("blackboard", task)
+
+
+VARIED = TASK.replace("[rubric]", "values = true\n[variants.parameters]\nm2 = [1.0, 3.0]\n[rubric]")
+
+
+def key_of(folder, students):
+    """Write the key of a task's variants, and return its folder and each student's mass of link 2."""
+    task = folder / "varied.toml"
+    task.write_text(VARIED)
+    variants = Variants.load(task)
+    drawn = [variants.of(student, 3) for student in students]
+    for name, content in key_files(variants, task, drawn, 3).items():
+        path = folder / "key" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return folder / "key", {one.student: one.values["m2"] for one in drawn}
+
+
+def test_each_student_of_gradescope_is_judged_by_the_own_numbers(tmp_path):
+    key, masses = key_of(tmp_path, ["ada", "1815"])
+    assert masses["ada"] != masses["1815"]
+    in_numbers = PROGRAM.replace(WRONG_G, RIGHT_G)
+    for name, number in (("m1", "2.0"), ("l1", "0.5"), ("l2", "0.4"), ("m2", masses["ada"])):
+        in_numbers = in_numbers.replace(name, number)
+    ada = {"email": "ada@example.edu", "id": 1, "name": "Ada Lovelace"}
+    charles = {"email": "cb@example.edu", "id": 2, "name": "Charles Babbage", "sid": "1815"}
+    files = {"answer.py": in_numbers}
+    assert on_gradescope(tmp_path / "ada", key, files, [ada])["score"] == 20
+    assert on_gradescope(tmp_path / "charles", key, files, [charles])["score"] < 10
+    stranger = on_gradescope(tmp_path / "stranger", key, files, [{"email": "x@example.edu"}])
+    assert stranger["score"] == 0
+    assert "no variant for x@example.edu" in stranger["output"]
+
+
+def test_variants_are_packed_by_their_key_alone(tmp_path):
+    key, _ = key_of(tmp_path, ["ada"])
+    with pytest.raises(AnswerError, match="has variants"):
+        pack("gradescope", tmp_path / "varied.toml")
+    with pytest.raises(AnswerError, match="only Gradescope says who hands in"):
+        pack("otter", key)
+    (key / "robots" / "ada.toml").write_text("changed")
+    with pytest.raises(AnswerError, match="not the robot file that was written"):
+        pack("gradescope", key)

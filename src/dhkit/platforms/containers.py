@@ -5,10 +5,14 @@ from __future__ import annotations
 import html
 import json
 import uuid
+from collections.abc import Mapping
 
 from dhkit.grading.empty_sheet import template
-from dhkit.platforms.contents import Installation, Package, Task
+from dhkit.grading.variants import VariantKey
+from dhkit.platforms.contents import Installation, Package, Task, key_contents
 
+KEY = "key"
+"""Folder of a package that has the key of variants."""
 _ANSWER_FILE = "answer.toml"
 _TIMEOUT = 300
 """Time for a submission on the clock, s; PrairieLearn permits up to 600."""
@@ -57,12 +61,25 @@ def gradescope_package(task: Task, installation: Installation) -> Package:
 
     Source: Gradescope, Autograder Specifications.
     """
+    return _autograder(task.files, installation)
+
+
+def gradescope_key_package(key: VariantKey, installation: Installation) -> Package:
+    """Return the autograder's zip file for variants: each student is judged by the own robot.
+
+    Source: Gradescope, Autograder Specifications, "Submission Metadata".
+    """
+    files = {f"{KEY}/{name}": content for name, content in key_contents(key).items()}
+    return _autograder(files, installation)
+
+
+def _autograder(contents: Mapping[str, bytes], installation: Installation) -> Package:
     scripts = {
         "setup.sh": _SETUP.format(requirement=installation.requirement),
         "run_autograder": _RUN_AUTOGRADER,
     }
     files = {name: text.encode() for name, text in scripts.items()}
-    return Package({**task.files, **installation.files, **files}, frozenset(scripts))
+    return Package({**contents, **installation.files, **files}, frozenset(scripts))
 
 
 def prairielearn_package(task: Task, installation: Installation, image: str) -> Package:

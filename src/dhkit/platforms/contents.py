@@ -20,6 +20,7 @@ from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.entry_points import robot_of
 from dhkit.grading.rubric import Rubric
+from dhkit.grading.variants.key import FILE, ROBOTS, TASK, VariantKey
 
 _TASK_BYTES = 1_000_000
 _ROBOT_BYTES = 2_000_000
@@ -112,6 +113,11 @@ class Task:
             The robot's file describes no robot.
         """
         sheet = read_task(path)
+        if sheet.variants:
+            raise AnswerError(
+                f"{path}: has variants; expected the folder key of `dhkit task variants` (for Gradescope), or a "
+                "task without them"
+            )
         if not sheet.robot:
             raise AnswerError(
                 f"{path}: robot: missing; expected a library name, or a file beside the task"
@@ -125,9 +131,20 @@ class Task:
                     f"{path}: robot: {sheet.robot!r}; expected another name, below the task's folder"
                 )
             files[str(place)] = _content(path.parent / sheet.robot, _ROBOT_BYTES, "a robot")
-        rubric = Rubric.from_data(sheet.rubric or {}, f"{path}: rubric: ")
-        rubric.require_mistakes(LIBRARY, f"{path}: rubric: ")
-        return cls(path.stem, sheet, description, rubric, files)
+        return cls(path.stem, sheet, description, _rubric_of(sheet, path), files)
+
+    @classmethod
+    def of_student(cls, key: VariantKey, student: str) -> Task:
+        """Return the task of a student whose robot is in the key of a task's variants.
+
+        Raises
+        ------
+        AnswerError
+            The key has no such student, or was changed.
+        """
+        sheet = read_task(key.task)
+        rubric = _rubric_of(sheet, key.task)
+        return cls(key.task.stem, sheet, key.robot_of(student), rubric, {})
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -180,6 +197,26 @@ class Installation:
     def files(self) -> dict[str, bytes]:
         """The wheel by its name; empty without one."""
         return {self.wheel_name: self.wheel} if self.wheel_name else {}
+
+
+def key_contents(key: VariantKey) -> dict[str, bytes]:
+    """Return the files of a key of variants, by their path in its folder.
+
+    Raises
+    ------
+    AnswerError
+        A file is missing, or was changed since the key was written.
+    """
+    for student in key.variants:
+        key.robot_of(student)
+    names = [FILE, TASK, *(f"{ROBOTS}/{student}.toml" for student in key.variants)]
+    return {name: _content(key.folder / name, _ROBOT_BYTES, "a key") for name in names}
+
+
+def _rubric_of(sheet: AnswerSheet, path: Path) -> Rubric:
+    rubric = Rubric.from_data(sheet.rubric or {}, f"{path}: rubric: ")
+    rubric.require_mistakes(LIBRARY, f"{path}: rubric: ")
+    return rubric
 
 
 def _content(path: Path, most: int, what: str) -> bytes:

@@ -5,7 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from dhkit.errors import AnswerError
-from dhkit.platforms.containers import gradescope_package, prairielearn_package
+from dhkit.grading.variants import VariantKey
+from dhkit.platforms.containers import (
+    gradescope_key_package,
+    gradescope_package,
+    prairielearn_package,
+)
 from dhkit.platforms.contents import Installation, Package, Task
 from dhkit.platforms.notebooks import nbgrader_package, otter_package
 from dhkit.platforms.quizzes import canvas_package, moodle_package, questions
@@ -31,7 +36,7 @@ def pack(
     platform
         One of :data:`PLATFORMS`.
     task
-        The task's file, with robot, ``[task]`` and ``[rubric]``.
+        The task's file, with robot, ``[task]`` and ``[rubric]``; for Gradescope also the key of a task's variants.
     wheel
         Wheel of dhkit to be installed on the platform; by default this version from the package index.
     image
@@ -62,11 +67,16 @@ def pack(
     """
     if platform not in PLATFORMS:
         raise AnswerError(f"platform: found {platform!r}; expected {', '.join(PLATFORMS)}")
-    read = Task.read(Path(task))
+    path = Path(task)
+    if path.is_dir() or path.suffix == ".json":
+        if platform != "gradescope":
+            raise AnswerError(f"{path}: a key of variants: only Gradescope says who hands in")
+        return gradescope_key_package(VariantKey.read(path), _installation(wheel))
+    read = Task.read(path)
     if platform in ("moodle", "canvas"):
         drawn = questions(read, count, seed)
         return moodle_package(read, drawn) if platform == "moodle" else canvas_package(read, drawn)
-    installation = Installation.of(None if wheel is None else Path(wheel))
+    installation = _installation(wheel)
     if platform == "gradescope":
         return gradescope_package(read, installation)
     if platform == "prairielearn":
@@ -78,3 +88,7 @@ def pack(
         if platform == "otter"
         else nbgrader_package(read, installation)
     )
+
+
+def _installation(wheel: str | Path | None) -> Installation:
+    return Installation.of(None if wheel is None else Path(wheel))

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from dhkit.description.files import write_atomically
-from dhkit.errors import AnswerError, DhkitError
+from dhkit.description.files import read_bounded, write_atomically
+from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.grading.batch import grade_all
 from dhkit.grading.entry_points import grade, prepare
 from dhkit.grading.grade_report import GradeReport
@@ -23,10 +23,14 @@ from dhkit.grading.options import GradeOptions
 from dhkit.grading.reports import gradescope, prairielearn, with_feedback
 from dhkit.grading.rubric import Rubric
 from dhkit.grading.sheets import find_sheets
+from dhkit.grading.variants import VariantKey
+from dhkit.platforms.containers import KEY
 from dhkit.platforms.contents import Task
 
 _SECONDS = 60.0
 """Processor time for judging a submission, s."""
+_METADATA_BYTES = 1_000_000
+"""Largest file of a submission's metadata, bytes."""
 USAGE = "expected: python -m dhkit.platforms.running gradescope|prairielearn FOLDER"
 
 
@@ -36,15 +40,24 @@ class Layout:
 
     task: str
     submission: str
+    metadata: str
     results: str
     result: Callable[[GradeReport, Marks], Mapping[str, object]]
 
 
 LAYOUTS = {
     # Source: Gradescope, Autograder Specifications.
-    "gradescope": Layout("source/task.toml", "submission", "results/results.json", gradescope),
+    "gradescope": Layout(
+        "source/task.toml",
+        "submission",
+        "submission_metadata.json",
+        "results/results.json",
+        gradescope,
+    ),
     # Source: PrairieLearn, External Grading.
-    "prairielearn": Layout("tests/task.toml", "student", "results/results.json", prairielearn),
+    "prairielearn": Layout(
+        "tests/task.toml", "student", "data/data.json", "results/results.json", prairielearn
+    ),
 }
 
 
@@ -62,7 +75,7 @@ def grade_submission(platform: str, root: Path) -> None:
     folder = root / layout.submission
     rubric = Rubric()
     try:
-        task = Task.read(root / layout.task)
+        task = _task(root, layout)
         rubric = task.rubric
         report = _judged(folder, task)
     except DhkitError as error:
@@ -75,6 +88,36 @@ def grade_submission(platform: str, root: Path) -> None:
         given = given.without_rules()
     result = layout.result(with_feedback(report, rubric.feedback), given)
     write_atomically(root / layout.results, json.dumps(result, ensure_ascii=False, indent=2))
+
+
+def _task(root: Path, layout: Layout) -> Task:
+    """Return the task, with the student's own robot where the package has a key of variants."""
+    key_folder = (root / layout.task).parent / KEY
+    if not key_folder.is_dir():
+        return Task.read(root / layout.task)
+    key = VariantKey.read(key_folder)
+    ids = list(_submitters(root / layout.metadata))
+    student = next((one for one in ids if one in key), None)
+    if student is None:
+        raise AnswerError(
+            f"no variant for {', '.join(ids) or 'an unknown student'}: ask your instructor"
+        )
+    return Task.of_student(key, student)
+
+
+def _submitters(path: Path) -> Iterator[str]:
+    """Yield ids of those who handed in, from Gradescope's metadata: number, address and its first part, name."""
+    try:
+        users = json.loads(read_bounded(path, _METADATA_BYTES, "metadata"))["users"]
+    except (ValueError, KeyError, TypeError, RecursionError, DescriptionError):
+        return
+    for user in users if isinstance(users, list) else ():
+        known = (
+            [user.get(key) for key in ("sid", "email", "name")] if isinstance(user, dict) else []
+        )
+        texts = [one for one in known if isinstance(one, str) and one]
+        yield from texts
+        yield from (one.partition("@")[0] for one in texts if "@" in one)
 
 
 def _judged(folder: Path, task: Task) -> GradeReport:
