@@ -462,7 +462,7 @@ def map_states(
     Returns
     -------
     DaskArray
-        Shape (N, *tail), in the blocks of the first array.
+        Rows of shape ``tail``, in the blocks of the first array.
 
     Raises
     ------
