@@ -139,6 +139,7 @@ def test_the_lab_assignment_can_be_solved_and_is_marked(week, tmp_path):
     assert (mark.student, mark.points, mark.notes) == ("Ada Lovelace", assignment.points, ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("week", WEEKS, ids=name_of)
 def test_the_lecture_runs(week):
     notebook = nbformat.read(week / "lecture.ipynb", as_version=4)

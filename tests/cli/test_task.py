@@ -93,6 +93,7 @@ def hand_in(folder, student, sheet, values):
     (folder / student / "sheet.toml").write_text(sheet)
 
 
+@pytest.mark.slow
 def test_a_class_is_judged_by_its_own_arms(course, dhkit):
     Path("students.txt").write_text("\n".join(CLASS))
     status, out, _ = dhkit(*variants("-o", "hw"))
