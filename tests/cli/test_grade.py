@@ -6,13 +6,17 @@ import re
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import pytest
 
 from dhkit.cli import grade
 from dhkit.cli.grade_output import Delivery
 from dhkit.errors import AnswerError
+from dhkit.grading.batch import judgement_key
+from dhkit.grading.exports import Keep, opened_submissions
 from dhkit.grading.grade_report import Entry, GradeReport, Verdict
+from dhkit.grading.lateness import LateRule
 from dhkit.grading.rubric import Credit, Rubric
 from grading.judged import REPORT
 
@@ -44,9 +48,15 @@ def dhkit(capsys):
     def run(*sheets, rubric=None, jobs=None, seconds=60.0, **delivery):
         if delivery.pop("json", False):
             delivery["form"] = "json"
-        status = grade.run(
-            sheets, judge, rubric or Rubric(), Delivery(**delivery), jobs=jobs, seconds=seconds
-        )
+        with opened_submissions(sheets) as submissions:
+            status = grade.run(
+                submissions,
+                judge,
+                rubric or Rubric(),
+                Delivery(**delivery),
+                jobs=jobs,
+                seconds=seconds,
+            )
         return status, *capsys.readouterr()
 
     return run
@@ -296,3 +306,113 @@ def test_an_output_that_cannot_be_meant_is_refused_before_anything_is_judged(tmp
     ):
         with pytest.raises(AnswerError, match="expected"):
             Delivery(form, output=tmp_path / name).check(several)
+
+
+GRADESCOPE = """
+submission_1:
+  :submitters: [{":name": Ada, ":sid": ada}]
+  :created_at: 2026-11-20 10:00:00 Z
+submission_2:
+  :submitters: [{":name": Ada, ":sid": ada}]
+  :created_at: 2026-11-22 10:00:00 Z
+submission_3:
+  :submitters: [{":name": Bob, ":sid": bob}]
+  :created_at: 2026-11-20 10:00:00 Z
+"""
+
+
+@pytest.fixture
+def handed_in_again(folder):
+    """Ada's first submission is right, and her second, which is late, is wrong."""
+    files = {"submission_metadata.yml": GRADESCOPE, "submission_1/answer.toml": "right"}
+    files |= {"submission_2/answer.toml": "wrong", "submission_3/answer.toml": "right"}
+    for name, text in files.items():
+        path = folder.parent / "export" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return folder.parent / "export"
+
+
+def rows_of(out):
+    rows = csv.DictReader((out / "marks.csv").read_text("utf-8").splitlines())
+    return [(row["student"], row["points"]) for row in rows]
+
+
+def test_the_best_submission_counts_and_the_others_keep_their_records(
+    dhkit, handed_in_again, tmp_path
+):
+    out = tmp_path / "out"
+    dhkit(handed_in_again, output=out)
+    assert rows_of(out) == [("ada", "100"), ("ada", "62.5"), ("bob", "100")]
+    dhkit(handed_in_again, output=out, keep=Keep.BEST)
+    assert rows_of(out) == [("ada", "100"), ("bob", "100")]
+    assert files_in(out / "records") == ["ada-2.json", "ada.json", "bob.json"]
+    assert files_in(out / "students") == ["ada.html", "bob.html"]
+
+
+def test_lateness_decides_which_is_the_best(dhkit, handed_in_again, tmp_path):
+    due = datetime(2026, 11, 19, 10, 1, tzinfo=UTC)
+    rubric = Rubric(late=LateRule(due, per_day=0.3))
+    out = tmp_path / "out"
+    _, printed, _ = dhkit(handed_in_again, rubric=rubric, output=out)
+    assert rows_of(out) == [("ada", "70"), ("ada", "6.25"), ("bob", "70")]
+    assert "70 of 100 (100 before; 1 day late: -30 %)" in re.sub(r"\s+", " ", printed)
+    assert "70 of 100 points (100 before; 1 day late: -30 %)" in (
+        out / "students" / "bob.html"
+    ).read_text("utf-8")
+    grade.mark_again([out], Rubric(), Delivery(output=tmp_path / "again", keep=Keep.BEST))
+    assert rows_of(tmp_path / "again") == [("ada", "100"), ("bob", "100")]
+
+
+def test_a_run_goes_on_where_it_was_stopped(folder, tmp_path, capsys):
+    """Reports are taken up by their keys; errors, and sheets that have changed, are judged again."""
+    out = tmp_path / "out"
+    asked = []
+
+    def run(key_of=lambda sheet: judgement_key(sheet, ["rules"])):
+        asked.clear()
+        with opened_submissions([folder]) as submissions:
+            grade.run(
+                submissions,
+                judge,
+                Rubric(),
+                Delivery(output=out),
+                jobs=1,
+                prepare=lambda report: asked.append(report.student),
+                key_of=key_of,
+            )
+        return list(asked), capsys.readouterr().err
+
+    assert run()[0] == ["ada", "bob"]
+    for part in ("marks.csv", "class.html", "records/bob.json"):
+        (out / part).unlink()
+    judged, said = run()
+    assert judged == ["bob"]
+    assert "1 of 3 sheets were judged before, and are taken up" in said
+    assert rows_of(out) == [("ada", "62.5"), ("bob", "100"), ("cleo", "0")]
+    (folder / "ada" / "answer.toml").write_text("right")
+    assert run()[0] == ["ada"]
+    assert rows_of(out)[0] == ("ada", "100")
+    assert run(lambda sheet: judgement_key(sheet, ["other rules"]))[0] == ["ada", "bob"]
+    (out / "records" / "ada.json").write_text("{half")
+    assert run(lambda sheet: judgement_key(sheet, ["other rules"]))[0] == ["ada"]
+
+
+def test_ctrl_c_says_how_to_go_on(folder, tmp_path, capsys):
+    def stop(report):
+        raise KeyboardInterrupt
+
+    with opened_submissions([folder]) as submissions, pytest.raises(KeyboardInterrupt):
+        grade.run(
+            submissions,
+            judge,
+            Rubric(),
+            Delivery(output=tmp_path / "out"),
+            jobs=1,
+            prepare=stop,
+            key_of=lambda sheet: judgement_key(sheet, []),
+        )
+    assert capsys.readouterr().err == (
+        f"dhkit: stopped; the same command goes on with {tmp_path / 'out'}\n"
+    )
+    assert files_in(tmp_path / "out") == ["records/ada.json"]

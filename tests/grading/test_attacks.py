@@ -616,6 +616,10 @@ class Page(html.parser.HTMLParser):
             "hr",
             "i",
             "a",
+            "svg",
+            "rect",
+            "line",
+            "text",
         ]
     )
 

@@ -238,7 +238,8 @@ def test_an_interrupt_leaves_no_process_behind(tmp_path, stop):
     def judge(path):
         if path.stem == "a":
             return right(path)
-        (tmp_path / path.stem).write_text(str(os.getpid()))
+        (tmp_path / "written").write_text(str(os.getpid()))
+        (tmp_path / "written").rename(tmp_path / path.stem)  # never seen empty
         time.sleep(LONG)
         return None
 

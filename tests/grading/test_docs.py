@@ -15,7 +15,7 @@ from dhkit.grading.answers.sheet import sheet_of
 from dhkit.grading.sheet_judge import judge_sheet
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "grading.md").read_text("utf-8")
-TASK, SHEET, STEPS, RUBRIC, VARIANTS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+TASK, SHEET, STEPS, RUBRIC, LATE, VARIANTS = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", PAGE, re.MULTILINE)
 
 
@@ -34,6 +34,7 @@ def test_the_steps_are_right():
 
 def test_the_rubric_is_one():
     assert Rubric.from_data(tomllib.loads(RUBRIC)).weights["M"] == 4
+    assert Rubric.from_data(tomllib.loads(LATE)).late.at_most == 0.5
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -3,6 +3,7 @@
 import base64
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -237,6 +238,13 @@ def test_marks_of_a_class(task, tmp_path, dhkit_command):
     status, out, _ = dhkit_command("grade", tmp_path / "class" / "ada", "--task", task, "--json")
     assert status == 1
     assert json.loads(out)[0]["points"] == 5.0
+    shutil.make_archive(tmp_path / "class", "zip", tmp_path / "class")
+    _, out, _ = dhkit_command("grade", tmp_path / "class.zip", "--task", task, "--json")
+    packed = [(row["points"], row["file"]) for row in json.loads(out)]
+    expected = [(5.0, "ada"), (5.0, "ben"), (0.0, "cy")]
+    assert packed == [
+        (points, str(tmp_path / "class.zip" / name / "two.lab.json")) for points, name in expected
+    ]
     with pytest.raises(AnswerError, match="no record of a lab"):
         (tmp_path / "empty").mkdir()
         find_records([tmp_path / "empty"])

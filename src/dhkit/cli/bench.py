@@ -155,10 +155,16 @@ def run_on_problems(path: Path, output: Path | None, *, json: bool) -> ExitStatu
 
 def write(report: Report, path: Path) -> tuple[Path, ...]:
     """Write a report as Markdown and as JSON, and as LaTeX for a path that ends in ``.tex``; return the files."""
-    forms = (report.markdown, lambda: _as_json(report), report.latex)
     files = _files(path)
-    for file, form in zip(files, forms, strict=False):
-        write_atomically(file, form())
+    for file in files:
+        match file.suffix.lower():
+            case ".md":
+                text = report.markdown()
+            case ".json":
+                text = _as_json(report)
+            case _:
+                text = report.latex()
+        write_atomically(file, text)
     return files
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, replace
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,29 +15,49 @@ import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.grade_folder import MAX_LISTED, Records, file_names
 from dhkit.cli.grade_output import Delivery
 from dhkit.cli.isolating import Isolated, isolation_for
 from dhkit.cli.options import Json, read_arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.streams import styled
-from dhkit.description import write_atomically
-from dhkit.display import counted
+from dhkit.description import Description, write_atomically
+from dhkit.display import counted, plain
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading import LIBRARY, grade as judge_sheet
 from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.answers.sheet_values import AnswerSheet
-from dhkit.grading.batch import GIGABYTE, Judge, grade_all
+from dhkit.grading.archives import is_archive, unpacked
+from dhkit.grading.batch import (
+    GIGABYTE,
+    Judge,
+    content_digest,
+    grade_all,
+    judgement_key,
+    origin_of_sheet,
+    seed_of_sheet,
+)
 from dhkit.grading.empty_sheet import template as empty_sheet
 from dhkit.grading.entry_points import prepare, robot_of
 from dhkit.grading.explanation import explanation_html, explanation_text
+from dhkit.grading.exports import (
+    ExportKind,
+    Keep,
+    Submissions,
+    last_attempts,
+    opened_submissions,
+    with_ids,
+)
 from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.options import GradeOptions
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Rubric
-from dhkit.grading.sheets import Sheet, find_sheets
+from dhkit.grading.sheet_judge import package_version
+from dhkit.grading.sheets import Sheet
 from dhkit.grading.variants import VariantKey
+from dhkit.grading.variants.students import read_students
 from dhkit.lab.assignment import Assignment, is_assignment
-from dhkit.lab.marks import find_records, lab_marks, lab_marks_csv
+from dhkit.lab.marks import LabMark, find_records, lab_marks, lab_marks_csv
 
 app = typer.Typer(rich_markup_mode=None)
 PRINTED = Delivery()
@@ -48,7 +68,9 @@ def grade(
     context: typer.Context,
     sheets: Annotated[
         list[Path] | None,
-        typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them."),
+        typer.Argument(
+            help="Answer sheets (.toml, .py, .m, .tex, .ipynb), folders of them, or a platform's export (.zip)."
+        ),
     ] = None,
     robot: Annotated[
         str | None, typer.Option(help="A library name or a robot file, instead of the sheets' own.")
@@ -91,6 +113,22 @@ def grade(
             min=0.1, help="Processor time for judging a sheet, s; four times as long on the clock."
         ),
     ] = 60.0,
+    export: Annotated[
+        ExportKind | None,
+        typer.Option(help="Layout of the folder or archive; default: recognized by its names."),
+    ] = None,
+    students: Annotated[
+        Path | None,
+        typer.Option(
+            help="List of students (.csv) with the names or numbers of an export, instead of which rows get its ids."
+        ),
+    ] = None,
+    keep: Annotated[
+        Keep,
+        typer.Option(
+            help="Which of a student's submissions counts; the last where the export tells their order."
+        ),
+    ] = Keep.LAST,
     remark: Annotated[
         bool, typer.Option("--remark", help="Mark earlier reports (JSON) again, without judging.")
     ] = False,
@@ -130,10 +168,10 @@ def grade(
     if task is not None and (task.is_dir() or task.suffix.lower() == ".json"):
         key = VariantKey.read(task)
         task = key.task
-    delivery = Delivery("json" if json else form, feedback, output, read)
+    delivery = Delivery("json" if json else form, feedback, output, read, keep)
     if remark:
-        used = ("remark", "sheets", "task", "rubric", "form", "json", "feedback", "read", "output")
-        _require_used(context, "--remark", used)
+        files = ("remark", "sheets", "task", "rubric", "output")
+        _require_used(context, "--remark", (*files, "form", "json", "feedback", "read", "keep"))
         return mark_again(sheets, _rubric_of_task(rubric, task), delivery)
     return grade_files(
         sheets,
@@ -147,6 +185,8 @@ def grade(
         jobs=jobs,
         seconds=seconds,
         key=key,
+        export=export,
+        students=students,
     )
 
 
@@ -197,7 +237,7 @@ def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | N
             f"{output}: ends in {output.suffix!r}; expected .csv for the marks of a lab"
         )
     assignment = Assignment.read(task)
-    marks = lab_marks(find_records(paths), assignment)
+    marks = _marks_of_records(paths, assignment)
     if output is not None:
         write_atomically(output, lab_marks_csv(marks, assignment))
         say(f"wrote {output}")
@@ -225,6 +265,34 @@ def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | N
     if any(mark.notes for mark in marks):
         return ExitStatus.UNUSABLE
     return ExitStatus.FINE if all(mark.points >= mark.most for mark in marks) else ExitStatus.NO
+
+
+def _marks_of_records(paths: Sequence[Path], assignment: Assignment) -> list[LabMark]:
+    """Return the marks of the records in files, folders and archives, which messages name as they were given."""
+    with ExitStack() as opened:
+        folders = {}
+        for path in paths:
+            is_packed = path.exists() and is_archive(path)
+            folders[opened.enter_context(unpacked(path)) if is_packed else path] = path
+        try:
+            marks = lab_marks(find_records(list(folders)), assignment)
+        except AnswerError as error:
+            raise AnswerError(_with_given_paths(str(error), folders)) from None
+    return [
+        replace(
+            mark,
+            file=Path(_with_given_paths(str(mark.file), folders)),
+            notes=tuple(_with_given_paths(note, folders) for note in mark.notes),
+        )
+        for mark in marks
+    ]
+
+
+def _with_given_paths(text: str, folders: Mapping[Path, Path]) -> str:
+    """Return a text in which archives are named instead of the folders into which they were unpacked."""
+    for folder, path in folders.items():
+        text = text.replace(str(folder), str(path))
+    return text
 
 
 def rubric_of(path: Path | None) -> Rubric:
@@ -278,13 +346,15 @@ def grade_files(
     jobs: int | None = None,
     seconds: float = 60.0,
     key: VariantKey | None = None,
+    export: ExportKind | None = None,
+    students: Path | None = None,
 ) -> ExitStatus:
     """Judge sheets about their own robots, all about one robot, or each about its student's variant.
 
     Parameters
     ----------
     sheets
-        Files, and folders of them.
+        Files, folders of them, and archives.
     robot
         The robot of all sheets, instead of the task's and the sheets' own.
     rubric
@@ -301,6 +371,10 @@ def grade_files(
         As in :func:`run`.
     key
         Key of the task's variants, which has a robot for each student.
+    export
+        Layout of the folders and archives; recognized unless given.
+    students
+        List of students, whose ids count instead of an export's names.
 
     Raises
     ------
@@ -327,44 +401,106 @@ def grade_files(
         chosen = _own_rubric(sheets[0])
     else:
         chosen = rubric_of(rubric)
-    are_several = len(sheets) > 1 or any(path.is_dir() for path in sheets)
-    if are_several:
-        prepare(about)
     own_files = [
         path for path in (rubric, task, Path(robot) if robot else None) if path is not None
     ]
     if key is not None:
         own_files.append(key.folder)
-    isolation = None
-    if execute:
-        packages = read.task.packages if read is not None else ()
-        name = sheets[0].name if not are_several else "the sheets' programs"
-        isolation = isolation_for(name, isolated or are_several, [*own_files, *sheets], packages)
-    options = GradeOptions(task=read, seed=seed, execute=isolation is not None, isolation=isolation)
+    listed = None if students is None else read_students(students)
+    if students is not None:
+        own_files.append(students)
+    with opened_submissions(sheets, export, own_files) as submissions:
+        _say_notes(submissions.notes)
+        _say_notes(_late_notes(submissions.sheets, chosen))
+        if listed is not None:
+            named, unknown = with_ids(submissions.sheets, listed)
+            submissions = replace(submissions, sheets=tuple(named))
+            if unknown:
+                _say_notes([f"{students}: nobody, or no single row, is {_listed(unknown)}"])
+        if delivery.keep is Keep.LAST:
+            submissions = replace(submissions, sheets=tuple(last_attempts(submissions.sheets)))
+        are_several = submissions.are_several
+        if are_several:
+            prepare(about)
+        isolation = None
+        if execute:
+            packages = read.task.packages if read is not None else ()
+            name = sheets[0].name if not are_several else "the sheets' programs"
+            hidden = [*own_files, *sheets, *submissions.folders]
+            isolation = isolation_for(name, isolated or are_several, hidden, packages)
+        options = GradeOptions(
+            task=read, seed=seed, execute=isolation is not None, isolation=isolation
+        )
+        whose = {} if key is None else _students(submissions.sheets, key)
 
-    def judge(path: Path) -> GradeReport:
-        subject = about if key is None else key.robot_of(students[path])
-        return judge_sheet(path, subject, chosen, options=options)
+        def subject_of(path: Path) -> Description | None:
+            return about if key is None else key.robot_of(whose[path])
 
-    students = {} if key is None else _students(find_sheets(sheets, own_files), key)
-    return run(
-        sheets,
-        judge,
-        chosen,
-        delivery,
-        exclude=own_files,
-        prepare=lambda report: prepare(about, report),
-        jobs=jobs,
-        seconds=seconds,
-    )
+        def judge(path: Path) -> GradeReport:
+            own = options
+            if seed is not None and are_several:
+                own = replace(options, seed=seed_of_sheet(seed, path))
+            return judge_sheet(path, subject_of(path), chosen, options=own)
+
+        rules = [
+            package_version(),
+            content_digest(task) if task is not None else "",
+            f"digits {chosen.digits}",
+            "from the system's entropy" if seed is None else f"seed {seed}",
+            f"executed {isolation}" if execute else "read as text",
+        ]
+
+        def key_of(sheet: Sheet) -> str:
+            try:
+                subject = subject_of(sheet.path)
+            except AnswerError:
+                return ""
+            return judgement_key(sheet, [*rules, subject.digest if subject is not None else ""])
+
+        return run(
+            submissions,
+            judge,
+            chosen,
+            delivery,
+            prepare=lambda report: prepare(about, report),
+            jobs=jobs,
+            seconds=seconds,
+            key_of=key_of,
+        )
+
+
+def _late_notes(sheets: Sequence[Sheet], rubric: Rubric) -> Iterator[str]:
+    """Yield a line on submissions that cannot be late, because nothing says when they were handed in."""
+    without = sum(sheet.time is None for sheet in sheets)
+    if rubric.late is None or not without:
+        return
+    due = f"due {rubric.late.due.isoformat()}"
+    if without == len(sheets):
+        yield f"{due}: nothing says when the sheets were handed in, and none counts as late"
+    else:
+        yield f"{due}: nothing says when {without} of {len(sheets)} sheets were handed in; they count as in time"
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
+    return ", ".join(plain(name, 80) for name in names[:MAX_LISTED]) + more
+
+
+def _say_notes(notes: Iterable[str]) -> None:
+    """Say on stderr how the files were read: stdout may be JSON."""
+    for note in notes:
+        sys.stderr.write(f"dhkit: {note}\n")
 
 
 def _students(sheets: Sequence[Sheet], key: VariantKey) -> dict[Path, str]:
-    """Return the student of each sheet by its file: the name of a single file counts, else that of its folder."""
+    """Return the student of each sheet by its file.
+
+    The name of a single file counts, else that of its folder; in an export any name by which it tells the student.
+    """
     students = {}
     for sheet in sheets:
         names = (
-            (sheet.student,)
+            (sheet.student, *sheet.aliases)
             if sheet.student
             else (sheet.path.stem, sheet.path.absolute().parent.name)
         )
@@ -379,7 +515,7 @@ def _rubric_from(data: Mapping[str, Any], path: Path | None) -> Rubric:
 
 
 def run(
-    sheets: Sequence[Path],
+    submissions: Submissions,
     judge: Judge,
     rubric: Rubric,
     delivery: Delivery = PRINTED,
@@ -387,15 +523,18 @@ def run(
     jobs: int | None = None,
     seconds: float = 60.0,
     memory: int = 2 * GIGABYTE,
-    exclude: Collection[Path] = (),
     prepare: Callable[[GradeReport], object] | None = None,
+    key_of: Callable[[Sheet], str] = lambda sheet: "",
 ) -> ExitStatus:
     """Judge sheets and deliver the reports; the status is NO if one is wrong, UNUSABLE if one is unreadable.
 
+    Results of a class that go into a folder are written one by one. After a stop, sheets whose record in the folder has
+    the same key are not judged again.
+
     Parameters
     ----------
-    sheets
-        Files, and folders of them.
+    submissions
+        The sheets.
     judge, prepare, seconds, memory
         As in :func:`~dhkit.grading.batch.grade_all`.
     jobs
@@ -404,30 +543,67 @@ def run(
         The rubric of all sheets.
     delivery
         Form and place of the reports.
-    exclude
-        Files in the folders that are not sheets.
+    key_of
+        Function from a sheet to the key of its judgement; empty for one that is always judged.
 
     Raises
     ------
     AnswerError
-        There is no such file, format or feedback, or the output would overwrite a sheet.
+        There is no such format or feedback, or the output would overwrite a sheet.
     """
-    paths = find_sheets(sheets, exclude)
-    several = len(paths) > 1 or any(path.is_dir() for path in sheets)
+    sheets = submissions.sheets
+    several = submissions.are_several
     delivery.check(several)
-    with _progress(len(paths)) as progress:
-        judged = grade_all(
-            paths,
-            judge,
-            jobs=jobs or os.cpu_count() or 1,
-            seconds=seconds,
-            memory=memory,
-            prepare=prepare,
-            progress=progress,
+    records = None
+    if delivery.output is not None and delivery.is_folder(several):
+        records = _records_of(sheets, delivery.output, key_of)
+    taken = {} if records is None else records.earlier()
+    waiting = [sheet for sheet in sheets if origin_of_sheet(sheet) not in taken]
+    if taken:
+        count = f"{len(taken)} of {counted(len(sheets), 'sheet')}"
+        sys.stderr.write(
+            f"dhkit: {delivery.output}: {count} were judged before, and are taken up\n"
         )
-        reports = list(judged)
-    delivery(reports, rubric, several)
+
+    def complete(report: GradeReport) -> None:
+        if records is not None:
+            records.write(report)
+        if prepare is not None:
+            prepare(report)
+
+    judged: list[GradeReport] = []
+    try:
+        with _progress(len(waiting)) as progress:
+            judged += grade_all(
+                waiting,
+                judge,
+                jobs=jobs or os.cpu_count() or 1,
+                seconds=seconds,
+                memory=memory,
+                prepare=complete,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        if records is not None:
+            sys.stderr.write(f"dhkit: stopped; the same command goes on with {delivery.output}\n")
+        raise
+    new = iter(judged)
+    reports = []
+    for sheet in sheets:
+        origin = origin_of_sheet(sheet)
+        reports.append(taken[origin] if origin in taken else next(new))
+    delivery(reports, rubric, several, records)
     return _status(reports)
+
+
+def _records_of(sheets: Sequence[Sheet], folder: Path, key_of: Callable[[Sheet], str]) -> Records:
+    """Return the records of a class's sheets, with the names that their files get."""
+    origins = [origin_of_sheet(sheet) for sheet in sheets]
+    names = file_names([student for student, _ in origins])
+    keys = [key_of(sheet) for sheet in sheets]
+    return Records(
+        folder, dict(zip(origins, names, strict=True)), dict(zip(origins, keys, strict=True))
+    )
 
 
 def mark_again(files: Sequence[Path], rubric: Rubric, delivery: Delivery = PRINTED) -> ExitStatus:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json as jsons
-import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,12 +12,19 @@ from typing import cast, get_args
 
 from rich.console import Console
 
-from dhkit.cli.grade_folder import MARKS, PARTS, clear_earlier_results
+from dhkit.cli.grade_folder import (
+    MARKS,
+    PARTS,
+    Records,
+    clear_earlier_results,
+    file_names,
+)
 from dhkit.cli.output import console, say
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
+from dhkit.grading.exports import Keep
 from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks, marks
 from dhkit.grading.reports import (
@@ -38,9 +44,6 @@ from dhkit.grading.rubric import Feedback, Rubric
 FORMS = ("text", "json", "gradescope", "junit", "html")
 FILE_WIDTH = 120
 """Width of text in a file, columns."""
-UNSAFE = re.compile(r"[^\w.-]+")
-"""Characters that file names made from students' names do not have."""
-MAX_NAME_BYTES = 80
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,9 @@ class Delivery:
     feedback, and everything else is for the teacher, without omissions. Printed unless given."""
     read: bool = False
     """Whether reports as text show how each entry was read."""
+    keep: Keep = Keep.ALL
+    """Which of a student's submissions counts: with ``BEST`` the one with the most points has a row. ``LAST`` was
+    chosen before they were judged."""
 
     def check(self, several: bool) -> None:
         """Refuse what cannot be meant, before anything is judged.
@@ -107,15 +113,42 @@ class Delivery:
             except DescriptionError as error:
                 raise AnswerError(str(error)) from None
 
-    def __call__(self, reports: Sequence[GradeReport], rubric: Rubric, several: bool) -> None:
-        """Mark reports, and print or write them; reports in a folder are printed as well."""
-        graded = [Graded(report, marks(report, rubric)) for report in reports]
+    def is_folder(self, several: bool) -> bool:
+        """Return whether reports are written into a folder."""
+        return self.output is not None and _is_folder(self.output, self.form, several)
+
+    def __call__(
+        self,
+        reports: Sequence[GradeReport],
+        rubric: Rubric,
+        several: bool,
+        records: Records | None = None,
+    ) -> None:
+        """Mark reports, and print or write them; reports in a folder are printed as well.
+
+        Parameters
+        ----------
+        reports
+            The reports.
+        rubric
+            The rubric.
+        several
+            Whether they are a class's.
+        records
+            Records of a run that can be continued.
+        """
+        judged = [Graded(report, marks(report, rubric)) for report in reports]
+        counts = are_best(judged) if self.keep is Keep.BEST else [True] * len(judged)
         level = cast("Feedback", self.feedback or rubric.feedback)
         form = self.form
         output = self.output
-        shown = [one.with_feedback(level) for one in graded]
+        pages = [
+            one.with_feedback(level) if is_counted else None
+            for one, is_counted in zip(judged, counts, strict=True)
+        ]
+        shown = [page for page in pages if page is not None]
         if output is not None and _is_folder(output, form, several):
-            _write_folder(graded, shown, output)
+            _write_folder(judged, pages, output, records)
         elif output is not None:
             write_atomically(output, _document(shown, form, level, several))
         if form == "json" and (output is None or output.is_dir()):
@@ -126,6 +159,17 @@ class Delivery:
             sys.stdout.write(_document(shown, form, level, several))
         if output is not None and form != "json":
             say(f"wrote {output}")
+
+
+def are_best(graded: Sequence[Graded]) -> list[bool]:
+    """Return for each report whether it is its student's with the most points; of equal ones the last is."""
+    best: dict[str, int] = {}
+    for number, one in enumerate(graded):
+        student = record_student(one.report)
+        if student not in best or one.marks.points >= graded[best[student]].marks.points:
+            best[student] = number
+    counting = set(best.values())
+    return [number in counting for number in range(len(graded))]
 
 
 def _is_folder(output: Path, form: str, several: bool) -> bool:
@@ -169,45 +213,52 @@ def _document(shown: Sequence[Graded], form: str, level: Feedback, several: bool
             return file.getvalue()
 
 
-def _json(one: Graded, level: Feedback) -> str:
-    return jsons.dumps(
-        json_report(one.report, one.marks, level), ensure_ascii=False, allow_nan=False
-    )
+def _json(one: Graded, level: Feedback, records: Records | None = None) -> str:
+    data = json_report(one.report, one.marks, level)
+    if records is not None:
+        data = records.marked(one.report, data)
+    return jsons.dumps(data, ensure_ascii=False, allow_nan=False)
 
 
 def _columns(graded: Sequence[Graded]) -> tuple[list[GradeReport], list[Marks]]:
     return [one.report for one in graded], [one.marks for one in graded]
 
 
-def _write_folder(graded: Sequence[Graded], shown: Sequence[Graded], folder: Path) -> None:
+def _write_folder(
+    judged: Sequence[Graded], shown: Sequence[Graded | None], folder: Path, records: Records | None
+) -> None:
     """Write the files of a class: marks, a page and full records for the teacher, and a page for each student.
 
     Results of an earlier run in the folder are removed.
+
+    Parameters
+    ----------
+    judged
+        All reports.
+    shown
+        For each of them what its student is shown; None for a submission that does not count, which has a record only.
+    folder
+        The folder.
+    records
+        Records of a run that can be continued.
     """
-    names = _names(graded)
+    names = file_names([record_student(one.report) for one in judged])
     clear_earlier_results(folder, names)
     for part in PARTS:
         (folder / part).mkdir(parents=True, exist_ok=True)
-    for name, whole, one in zip(names, graded, shown, strict=True):
-        write_atomically(folder / "records" / f"{name}.json", _json(whole, "full") + "\n")
-        write_atomically(folder / "students" / f"{name}.html", html_report(one.report, one.marks))
-    write_atomically(folder / MARKS, marks_csv(*_columns(graded)))
-    write_atomically(folder / "class.html", html_class(*_columns(graded)))
+    counting = []
+    for name, whole, one in zip(names, judged, shown, strict=True):
+        write_atomically(folder / "records" / f"{name}.json", _json(whole, "full", records) + "\n")
+        page = folder / "students" / f"{name}.html"
+        if one is None:
+            page.unlink(missing_ok=True)
+            continue
+        counting.append(whole)
+        write_atomically(page, html_report(one.report, one.marks))
+    write_atomically(folder / MARKS, marks_csv(*_columns(counting)))
+    write_atomically(folder / "class.html", html_class(*_columns(counting), table=MARKS))
 
 
-def _names(graded: Sequence[Graded]) -> list[str]:
-    """Return names of files, made from the students' names, that differ also where case does not count."""
-    names: dict[str, str] = {}
-    for one in graded:
-        student = one.report.student or Path(one.report.sheet or "sheet").stem
-        plain = (
-            UNSAFE.sub("_", student).encode()[:MAX_NAME_BYTES].decode(errors="ignore").lstrip(".")
-            or "sheet"
-        )
-        name = plain
-        number = 1
-        while name.casefold() in names:
-            number += 1
-            name = f"{plain}-{number}"
-        names[name.casefold()] = name
-    return list(names.values())
+def record_student(report: GradeReport) -> str:
+    """Return the student by whom the files of a report are named."""
+    return report.student or Path(report.sheet or "sheet").stem

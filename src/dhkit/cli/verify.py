@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from dhkit.cli.check_class import check_folder
 from dhkit.cli.endings import end_in_order_on_signals
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.extract import chain_of
@@ -18,6 +19,8 @@ from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm, read_arm
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
+from dhkit.grading.archives import is_archive
+from dhkit.grading.exports import ExportKind
 from dhkit.programs import (
     CheckRubric,
     Limits,
@@ -94,7 +97,8 @@ def check(
     program: Annotated[
         list[str],
         typer.Argument(
-            help="A file (.py, .m) that defines fk, ik or controller; with --run a program, its arguments."
+            help="A file (.py, .m) that defines fk, ik or controller, or a class's folder or archive of them; "
+            "with --run a program, its arguments."
         ),
     ],
     run: Annotated[
@@ -119,11 +123,23 @@ def check(
         ),
     ] = 5.0,
     isolated: Isolated = False,
+    export: Annotated[
+        ExportKind | None,
+        typer.Option(help="Layout of a class's folder; default: recognized by its names."),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, max=1024, help="Number of a class's programs that run at a time."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for a class: marks.csv, class.html, records."),
+    ] = None,
     json: Json = False,
 ) -> ExitStatus:
     """Score a program's forward and inverse kinematics and its controller, and say where it fails first.
 
-    Exit status 0: full marks; 1: fewer; 2: it cannot be loaded.
+    The programs of a class are always isolated. Exit status 0: full marks; 1: fewer; 2: it cannot be loaded.
     """
     if not run and len(program) != 1:
         raise DescriptionError(
@@ -133,15 +149,31 @@ def check(
     source = program if run else Path(program[0])
     protect_from_children()
     end_in_order_on_signals()
+    first = Path(program[0])
+    if not run and first.exists() and (first.is_dir() or is_archive(first)):
+        return check_folder(
+            arm,
+            first,
+            rubric,
+            seed=seed,
+            samples=samples,
+            seconds=seconds,
+            export=export,
+            jobs=jobs,
+            output=output,
+            json=json,
+        )
+    if export is not None or output is not None:
+        raise DescriptionError("--export and --output are for the programs of a class, a folder")
     points = None if rubric is None else CheckRubric.read(rubric)
     place = isolation_for(Path(program[0]).name, isolated, [] if rubric is None else [rubric])
     with Program(source, Limits(seconds=seconds), place) as loaded:
         try:
             report = score(arm, loaded, points, seed, samples)
         except ProgramError as error:
-            output = loaded.output.strip()
+            printed = loaded.output.strip()
             if json:
-                print_json({"error": str(error), "line": error.line, "output": output[-2000:]})
+                print_json({"error": str(error), "line": error.line, "output": printed[-2000:]})
             else:
                 line = (
                     str(error) if str(error).startswith(f"{source}") else f"{loaded.name}: {error}"

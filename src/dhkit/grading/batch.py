@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json as jsons
 import os
 import selectors
 import signal
@@ -81,6 +83,74 @@ def grade_all(
     return _in_order(results, len(sheets), prepare, progress)
 
 
+def origin_of_sheet(sheet: Sheet) -> tuple[str, str]:
+    """Return the student and the file of a sheet of a class as its report names them."""
+    return _printable(sheet.student or sheet.path.stem), _printable(sheet.name)
+
+
+def content_digest(path: Path) -> str:
+    """Return the SHA-256 of a file's content, hexadecimal; empty if it is not a file that can be read."""
+    try:
+        if not path.is_file():
+            return ""
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+def seed_of_sheet(seed: int, path: Path) -> int:
+    """Return the seed of the random states of one sheet of a class.
+
+    It depends on the seed of the run and on the content of the file alone: not on the order in which sheets are judged,
+    nor on the others.
+
+    Parameters
+    ----------
+    seed
+        Seed of the run.
+    path
+        The sheet.
+
+    Returns
+    -------
+    int
+        A number of 53 bits, which JSON keeps.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> for name in ("a.py", "b.py"):
+    ...     size = Path(name).write_text("g1 = 0")
+    >>> seed_of_sheet(7, Path("a.py")) == seed_of_sheet(7, Path("b.py")) != seed_of_sheet(8, Path("a.py"))
+    True
+    """
+    digest = hashlib.sha256(f"{seed}:{content_digest(path)}".encode()).digest()
+    return int.from_bytes(digest[:8]) >> 11
+
+
+def judgement_key(sheet: Sheet, rules: Sequence[str]) -> str:
+    """Return a digest of all that a sheet's report depends on; empty if the sheet cannot be read.
+
+    Parameters
+    ----------
+    sheet
+        The sheet.
+    rules
+        What the report depends on besides: dhkit's version, the task, the robot, options.
+
+    Returns
+    -------
+    str
+        SHA-256, hexadecimal: a report with the same key need not be made again.
+    """
+    content = "" if sheet.error else content_digest(sheet.path)
+    if not content:
+        return ""
+    parts = [content, sheet.student, sheet.name, str(sheet.time), *sheet.beside, *rules]
+    return hashlib.sha256(jsons.dumps(parts).encode()).hexdigest()
+
+
 def _in_order(
     results: Iterator[_Numbered],
     total: int,
@@ -106,7 +176,7 @@ def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: WorkerLimits) -> 
         report = (
             GradeReport(error=sheet.error)
             if sheet.error
-            else report_of(_judge_to_json(sheet.path, judge, limits))
+            else report_of(_judge_to_json(sheet, judge, limits))
         )
         yield number, _with_origin(report, sheet, time.monotonic() - begin)
 
@@ -126,8 +196,21 @@ def _judge_in_processes(
             yield from pool.wait()
 
 
-def _judge_to_json(path: Path, judge: Judge, limits: WorkerLimits) -> bytes:
+def _judge_to_json(sheet: Sheet, judge: Judge, limits: WorkerLimits) -> bytes:
     """Return the report of a sheet as JSON; an exception of the judge becomes its error."""
+    report = _judge_path_to_json(sheet.path, judge, limits)
+    if not sheet.shown:
+        return report
+    # Messages name the file; one from an archive has a temporary path.
+    return report.replace(_json_text(str(sheet.path)), _json_text(sheet.shown))
+
+
+def _json_text(text: str) -> bytes:
+    """Return a text as it stands between the quotation marks of JSON."""
+    return jsons.dumps(text, ensure_ascii=False)[1:-1].encode("utf-8", "replace")
+
+
+def _judge_path_to_json(path: Path, judge: Judge, limits: WorkerLimits) -> bytes:
     starved = _error_json(limits.starved)  # made while there is memory
     try:
         return judge(path).to_json().encode("utf-8", "replace")
@@ -165,7 +248,7 @@ class _Pool:
         """Begin to judge a sheet; return why that is impossible, empty if it is not."""
         try:
             worker = start_worker(
-                partial(_judge_to_json, sheet.path, self.judge, self.limits), self.limits
+                partial(_judge_to_json, sheet, self.judge, self.limits), self.limits
             )
         except OSError as error:
             return f"no process to judge it in: {error.strerror}"
@@ -239,8 +322,9 @@ def _with_origin(report: GradeReport, sheet: Sheet, seconds: float) -> GradeRepo
     """Return a report with the fields that this process knows better than the judge."""
     return replace(
         report,
-        sheet=_printable(str(sheet.path)),
+        sheet=origin_of_sheet(sheet)[1],
         student=_printable(sheet.student or report.student or sheet.path.stem),
+        handed_in="" if sheet.time is None else sheet.time.isoformat(),
         seconds=report.seconds or seconds,
         left_out=(*report.left_out, *(f"not read: {_printable(name)}" for name in sheet.beside)),
     )

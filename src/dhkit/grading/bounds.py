@@ -23,6 +23,18 @@ class Bounds:
     rubric_bytes: int = 100_000
     """Size of a rubric."""
 
+    # Archives of sheets.
+    archive_bytes: int = 4_000_000_000
+    """Size of all files of an archive: three hundred students hand in scans and pictures too."""
+    archive_ratio: int = 100
+    """Size of all files of an archive, as a multiple of its own."""
+    archive_free_bytes: int = 100_000_000
+    """Size of all files of an archive to which the ratio does not apply: a class of equal sheets packs well."""
+    archive_depth: int = 20
+    """Folders in which a file of an archive may lie."""
+    metadata_bytes: int = 50_000_000
+    """Size of the file in which Gradescope names the submitters; it has the results of all autograders."""
+
     # Variants.
     varied_parameters: int = 30
     """Parameters, and robots, that a task lets vary: their numbers are compared in pairs."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json as jsons
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
+from datetime import datetime
 from enum import Enum
+from typing import Annotated
 
-from pydantic import TypeAdapter
+from pydantic import AfterValidator, TypeAdapter
 
 from dhkit.display import counted, html_block, html_lines, html_table, plain, repr_line
 from dhkit.grading.bounds import BOUNDS
@@ -224,6 +226,13 @@ class KinematicJudgement:
         return worst_verdict(self.entries) or Verdict.UNREADABLE
 
 
+def _time_or_empty(text: str) -> str:
+    """Return a time as text; refuse one that is none, or has no zone."""
+    if text and datetime.fromisoformat(text).tzinfo is None:
+        raise ValueError("a time without a zone")
+    return text
+
+
 @dataclass(frozen=True)
 class GradeReport:
     """Result of judging an answer sheet.
@@ -261,6 +270,8 @@ class GradeReport:
         Whether the task asks for proof: sampled and undecided entries then do not pass.
     own_robot
         Whether the sheet itself names the robot that it was judged by.
+    handed_in
+        When the sheet was handed in: ISO 8601 with a zone; empty if nothing says it.
 
     Examples
     --------
@@ -285,6 +296,7 @@ class GradeReport:
     seed: int | None = field(default=None, compare=False)
     proof_required: bool = False
     own_robot: bool = False
+    handed_in: Annotated[str, AfterValidator(_time_or_empty)] = ""
 
     @property
     def verdict(self) -> Verdict:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from fractions import Fraction
 
 from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.grading.answers.sheet import QUANTITY
 from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict
+from dhkit.grading.lateness import Lateness
 from dhkit.grading.rubric import Credit, Rubric
 
 
@@ -34,13 +36,24 @@ class Marks:
     entries
         Marks of the entries, in the report's order.
     quantities
-        Sums by quantity, also for quantities that are asked for and missing.
+        Sums by quantity, also for quantities that are asked for and missing; before points are lost by lateness.
+    lost
+        Points lost by lateness.
+    late
+        Days late, and the share that is lost; empty for a submission in time.
     """
 
     points: float
     most: float
     entries: tuple[Mark, ...] = ()
     quantities: tuple[Mark, ...] = ()
+    lost: float = 0.0
+    late: str = ""
+
+    @property
+    def before(self) -> float:
+        """Points before any are lost by lateness."""
+        return self.points + self.lost
 
     def data(self) -> dict[str, object]:
         """Return all fields as plain data."""
@@ -64,7 +77,8 @@ class Marks:
 
     @property
     def _points(self) -> str:
-        return f"{self.points:.4g} of {self.most:.4g} points"
+        late = f", {self.late}" if self.late else ""
+        return f"{self.points:.4g} of {self.most:.4g} points{late}"
 
 
 def marks(report: GradeReport, rubric: Rubric) -> Marks:
@@ -113,12 +127,23 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     for quantity, (got, most) in sums.items():
         rule = "not on the sheet" if quantity in missing else ""
         quantities.append(Mark(quantity, float(got), float(most), rule))
+    total_points = sum((got for got, _ in sums.values()), Fraction(0))
+    lateness = _lateness(report, rubric)
     return Marks(
-        float(sum(got for got, _ in sums.values())),
+        float(total_points * (1 - lateness.share)),
         rubric.points,
         tuple(entries),
         tuple(quantities),
+        lost=float(total_points * lateness.share),
+        late=str(lateness) if lateness.days else "",
     )
+
+
+def _lateness(report: GradeReport, rubric: Rubric) -> Lateness:
+    """Return the lateness of a sheet; without a rule, or a time of the sheet, it is in time."""
+    if rubric.late is None or not report.handed_in:
+        return Lateness(0, Fraction(0))
+    return rubric.late.lateness(datetime.fromisoformat(report.handed_in))
 
 
 def _quantity_weights(report: GradeReport, rubric: Rubric) -> dict[str, Fraction]:

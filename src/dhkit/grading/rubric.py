@@ -6,6 +6,7 @@ import difflib
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
+from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
@@ -19,6 +20,7 @@ from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sheet import QUANTITY
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.lateness import LateRule, Share
 
 _STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 WEIGHED = re.compile(
@@ -31,7 +33,6 @@ QUANTITIES = ("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", "dh", "ik", "A
 Feedback: TypeAlias = Literal["full", "hint", "verdict"]
 """Level of detail of a report: everything; verdicts and where to look; verdicts alone."""
 
-Share = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 
 
@@ -81,6 +82,8 @@ class Rubric:
     """Significant digits from which a decimal may be rounded."""
     feedback: Feedback = "full"
     """Level of detail of a report: everything (full), where to look (hint), or verdicts alone (verdict)."""
+    late: LateRule | None = None
+    """Points that a late submission loses, where the export says when it was handed in."""
 
     @classmethod
     def read(cls, path: str | Path) -> Rubric:
@@ -169,13 +172,28 @@ def _entry_name(name: str) -> str | None:
     return quantity + separator.join(indices)
 
 
+_TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
+_EXPECTED = {
+    "dataclass_type": "a table",
+    "dict_type": "a table",
+    "float_type": "a number",
+    "datetime_type": _TIME,
+    "timezone_aware": _TIME,
+    "string_pattern_mismatch": "a duration, such as '10 min' (s, min, h or d)",
+}
+"""Expected value by the type of an error."""
+
+
 def _one_line(error: ErrorDetails) -> str:
     path = [str(part)[:80] for part in error["loc"] if part != "[key]"]
     if error["type"] == "unexpected_keyword_argument":
-        known = [field.name for field in fields(Credit if path[:-1] == ["credit"] else Rubric)]
+        tables = {"credit": Credit, "late": LateRule}
+        known = [field.name for field in fields(tables.get("".join(path[:-1]), Rubric))]
         place = "".join(f"{part}: " for part in path[:-1])
         return f"{place}unknown key {path[-1]!r}{_hint(path[-1], known)}"
-    expected = {"dataclass_type": "a table", "dict_type": "a table", "float_type": "a number"}.get(
+    if error["type"] == "missing":
+        return f"{'.'.join(path)}: missing"
+    expected = _EXPECTED.get(
         error["type"], error["msg"].removeprefix("Input should be ").removeprefix("a valid ")
     )
     return f"{'.'.join(path)}: found {_short_repr(error['input'])}; expected {expected}"
@@ -189,5 +207,5 @@ def _hint(name: str, known: Collection[str]) -> str:
 
 
 def _short_repr(found: object) -> str:
-    text = repr(found)
+    text = found.isoformat() if isinstance(found, date) else repr(found)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import chain
 from pathlib import Path
 
@@ -34,15 +35,41 @@ class Sheet:
         Why the sheet is not to be judged; empty if it is.
     beside
         Names of the student's other files, which are not read.
+    shown
+        Name of the file in reports; empty for its path.
+    aliases
+        Other names by which a platform's export tells the student: a number, an address, an ID.
+    series, attempt
+        Sheets of a student that have the same series were handed in one after the other, in the order of their
+        attempts from 0.
+    time
+        When the sheet was handed in; None if nothing says it.
+    is_marked_late
+        Whether the export marks the sheet as late.
     """
 
     path: Path
     student: str = ""
     error: str = ""
     beside: tuple[str, ...] = ()
+    shown: str = ""
+    aliases: tuple[str, ...] = ()
+    series: str = ""
+    attempt: int = 0
+    time: datetime | None = None
+    is_marked_late: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of the file in reports."""
+        return self.shown or str(self.path)
 
 
-def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[Sheet]:
+def find_sheets(
+    paths: Sequence[Path],
+    exclude: Collection[Path] = (),
+    suffixes: Collection[str] = SHEET_SUFFIXES,
+) -> list[Sheet]:
     """Return the sheets among files and folders, each once, in the order given and by name within a folder.
 
     A file is taken as it is. In a folder and the folders below, files with a suffix of answer sheets are taken; hidden
@@ -62,6 +89,8 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
         Files and folders.
     exclude
         Files in them that are not sheets, such as the rubric.
+    suffixes
+        Suffixes of the files that are read.
 
     Raises
     ------
@@ -77,7 +106,9 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
                 f"{path}: no such file; expected an answer sheet or a folder of them (--template NAME makes one)"
             )
         for sheet in (
-            _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]
+            _in_folder(path, passed_over, suffixes)
+            if path.is_dir()
+            else [Sheet(path, _student(path, stems))]
         ):
             found.setdefault(sheet.path.absolute(), sheet)
             if len(found) > BOUNDS.sheets:
@@ -91,31 +122,54 @@ def _student(path: Path, stems: Counter[str]) -> str:
     return path.absolute().parent.name if stems[path.stem] > 1 else path.stem
 
 
-def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
-    sheets: dict[str, list[Sheet]] = {}
-    unread: dict[str, list[Path]] = {}
-    for sheet in _visit(root):
-        if not sheet.error and sheet.path.resolve() in passed_over:
-            continue
-        if sheet.error == _UNREAD:
-            unread.setdefault(sheet.student, []).append(sheet.path)
-        else:
-            sheets.setdefault(sheet.student, []).append(sheet)
+def _in_folder(root: Path, passed_over: Collection[Path], suffixes: Collection[str]) -> list[Sheet]:
+    visited = []
+    for sheet in visit(root, suffixes):
+        is_own = sheet.error in ("", UNREAD) and sheet.path.resolve() in passed_over
+        is_robot_beside = sheet.error == UNREAD and _is_robot_of_all(sheet.path, root, suffixes)
+        if not is_own and not is_robot_beside:
+            visited.append(sheet)
+    return gathered(visited, root, suffixes)
+
+
+def gathered(visited: Sequence[Sheet], root: Path, suffixes: Collection[str]) -> list[Sheet]:
+    """Return the sheets of a folder, with the files that are not read listed beside the sheet of the same submission.
+
+    Parameters
+    ----------
+    visited
+        What :func:`visit` found, with the students.
+    root
+        The folder.
+    suffixes
+        Suffixes of the files that are read.
+
+    Raises
+    ------
+    AnswerError
+        There is no sheet at all.
+    """
+    sheets: dict[tuple[str, int], list[Sheet]] = {}
+    unread: dict[tuple[str, int], list[Sheet]] = {}
+    for sheet in visited:
+        submission = (sheet.student, sheet.attempt)
+        kind = unread if sheet.error == UNREAD else sheets
+        kind.setdefault(submission, []).append(sheet)
     if not sheets:
         raise AnswerError(
-            f"{root}: no answer sheet; expected files that end in {', '.join(sorted(SHEET_SUFFIXES))}"
+            f"{root}: no answer sheet; expected files that end in {', '.join(sorted(suffixes))}"
         )
-    for student, paths in unread.items():
-        if student in sheets:
-            first, *others = sheets[student]
-            sheets[student] = [
-                replace(first, beside=_shorten([path.name for path in paths])),
-                *others,
-            ]
+    for submission, others in unread.items():
+        if submission in sheets:
+            first, *more = sheets[submission]
+            names = [Path(other.name).name for other in others]
+            sheets[submission] = [replace(first, beside=_shorten(names)), *more]
         else:
-            kinds = dict.fromkeys(path.suffix.lower() or path.name for path in paths)
-            error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(SHEET_SUFFIXES))}"
-            sheets[student] = [Sheet(paths[0], student, error)]
+            kinds = dict.fromkeys(
+                other.path.suffix.lower() or Path(other.name).name for other in others
+            )
+            error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(suffixes))}"
+            sheets[submission] = [replace(others[0], error=error)]
     return sorted(chain.from_iterable(sheets.values()), key=lambda sheet: sheet.path.parts)
 
 
@@ -124,11 +178,25 @@ def _shorten(names: Sequence[str]) -> tuple[str, ...]:
     return (*names[: BOUNDS.listed_files], *more)
 
 
-_UNREAD = "unread"
-"""Marks, in :func:`_visit`, a file with another suffix; it is replaced by a message for the student."""
+UNREAD = "unread"
+"""Error, in what :func:`visit` yields, of a file with another suffix; :func:`gathered` replaces it by a message."""
 
 
-def _visit(root: Path) -> Iterator[Sheet]:
+def visit(root: Path, suffixes: Collection[str]) -> Iterator[Sheet]:
+    """Yield every file below a folder as a sheet of the student that its place says; :func:`gathered` sorts them.
+
+    Parameters
+    ----------
+    root
+        The folder.
+    suffixes
+        Suffixes of the files that are read; others, and robot files, have the error :data:`UNREAD`.
+
+    Raises
+    ------
+    AnswerError
+        There are too many files.
+    """
     inside = root.resolve()
     for looked_at, path in enumerate(_walk(root, 0)):
         if looked_at >= BOUNDS.files:
@@ -137,16 +205,20 @@ def _visit(root: Path) -> Iterator[Sheet]:
             )
         parts = path.relative_to(root).parts
         student = path.stem if len(parts) == 1 else parts[0]
-        if path.is_symlink() and (fault := _fault_of_link(path, inside)):
+        if path.is_symlink() and (fault := _fault_of_link(path, inside, suffixes)):
             yield Sheet(path, student, fault)
         elif path.is_dir():
             if fault := _fault_of_folder(path, len(parts)):
                 yield Sheet(path, student, fault)
-        elif path.suffix.lower() not in SHEET_SUFFIXES or _is_robot(path):
-            if len(parts) > 1 or path.suffix.lower() not in SHEET_SUFFIXES:
-                yield Sheet(path, student, _UNREAD)
+        elif path.suffix.lower() not in suffixes or _is_robot(path):
+            yield Sheet(path, student, UNREAD)
         else:
             yield Sheet(path, student, "" if path.is_file() else "not a regular file")
+
+
+def _is_robot_of_all(path: Path, root: Path, suffixes: Collection[str]) -> bool:
+    """Whether a file is a robot file directly in the folder, which all sheets may name."""
+    return path.parent == root and path.suffix.lower() in suffixes
 
 
 def _walk(folder: Path, depth: int) -> Iterator[Path]:
@@ -164,15 +236,13 @@ def _walk(folder: Path, depth: int) -> Iterator[Path]:
             yield from _walk(path, depth + 1)
 
 
-def _fault_of_link(path: Path, inside: Path) -> str:
+def _fault_of_link(path: Path, inside: Path, suffixes: Collection[str]) -> str:
     """Return the error of a link; empty if its target is inside the folder, or would not be a sheet."""
     try:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError):
-        return "a link that leads nowhere" if path.suffix.lower() in SHEET_SUFFIXES else ""
-    if target.is_relative_to(inside) or not (
-        target.is_dir() or path.suffix.lower() in SHEET_SUFFIXES
-    ):
+        return "a link that leads nowhere" if path.suffix.lower() in suffixes else ""
+    if target.is_relative_to(inside) or not (target.is_dir() or path.suffix.lower() in suffixes):
         return ""
     return "a link out of the folder; it is not followed"
 

@@ -6,13 +6,14 @@ import io
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, strategies as st
 from rich.console import Console
 
 from dhkit.errors import AnswerError
-from dhkit.grading.grade_report import GradeReport
+from dhkit.grading.grade_report import Entry, GradeReport, Verdict
 from dhkit.grading.marks import marks
 from dhkit.grading.reports import (
     gradescope,
@@ -29,7 +30,7 @@ from dhkit.grading.reports import (
 )
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.rubric import Rubric
-from grading.judged import REPORT, anything, reports
+from grading.judged import REPORT, SIGN, anything, reports
 
 MARKS = marks(REPORT, Rubric())
 BROKEN = GradeReport(
@@ -37,7 +38,7 @@ BROKEN = GradeReport(
 )
 HOSTILE = "<script>alert(1)</script>\"'&\x1b[31m[bold red]\u202e=cmd()"
 TAGS = re.compile(
-    "html|head|meta|title|style|body|h1|h2|h3|p|span|div|table|tr|th|td|section|article|details|summary|a|i|code|"
+    "html|head|meta|title|style|body|h1|h2|h3|p|span|div|ul|li|svg|rect|line|text|table|tr|th|td|section|article|details|summary|a|i|code|"
     "math|mrow|mi|mn|mo|mtext|mspace|mfrac|msqrt|mroot|msub|msup|msubsup|munder|mover|munderover|mtable|mtr|mtd|mstyle"
 )
 
@@ -268,3 +269,75 @@ def test_csv():
         "abc123",
         "0.1.0",
     )
+
+
+def class_of(*verdicts, **changes):
+    """Return a report of every verdict, a student each."""
+    return [
+        replace(
+            REPORT,
+            student=f"student{k}",
+            entries=(Entry("V", (), verdict, "x"),),
+            diagnosis=(),
+            **changes,
+        )
+        for k, verdict in enumerate(verdicts)
+    ]
+
+
+def order_of(page, *texts):
+    places = [page.index(text) for text in texts]
+    return places == sorted(places)
+
+
+def test_the_class_page_says_what_needs_a_person_in_order():
+    several = class_of(Verdict.CORRECT, Verdict.UNDECIDED)
+    refused = replace(several[0], student="carl", left_out=("not read: scan.pdf",))
+    page = html_class(
+        [refused, *several, BROKEN], [marks(one, Rubric()) for one in (refused, *several, BROKEN)]
+    )
+    assert order_of(
+        page,
+        "What needs a person",
+        "Could not be read",
+        'href="#sheet-4"',
+        "Neither proved nor refuted",
+        'href="#sheet-3"',
+        "not read as answers",
+        'href="#sheet-1"',
+        "Marks",
+    )
+    fine = class_of(Verdict.CORRECT, Verdict.CORRECT)
+    assert "Nothing: all was read and decided." in html_class(
+        fine, [marks(one, Rubric()) for one in fine]
+    )
+
+
+def test_the_class_page_groups_mistakes_the_most_frequent_first():
+    other = replace(SIGN, mistake="inertia_about_joint")
+    named = [replace(REPORT, student=name, diagnosis=(SIGN,)) for name in ("ada", "bob")]
+    named.append(replace(REPORT, student="cleo", diagnosis=(other,)))
+    named.append(replace(REPORT, student="dora", diagnosis=()))
+    page = html_class(named, [marks(one, Rubric()) for one in named])
+    wrong = page[page.index("What went wrong") : page.index('id="marks"')]
+    assert order_of(
+        wrong,
+        "gravity_sign",
+        '2 of 4 sheets: <a href="#sheet-1">ada</a>, <a href="#sheet-2">bob</a>',
+        "inertia_about_joint",
+        '1 of 4 sheets: <a href="#sheet-3">cleo</a>',
+        "no mistake that has a name",
+        "dora",
+    )
+
+
+def test_the_class_page_has_the_distribution_of_points():
+    verdicts = [Verdict.CORRECT] * 3 + [Verdict.WRONG] * 2
+    several = class_of(*verdicts)
+    page = html_class(
+        several, [marks(one, Rubric(points=20)) for one in several], table="marks.csv"
+    )
+    assert 'aria-label="2 sheets from 0 to 2; 3 sheets from 18 to 20"' in page
+    assert "5 sheets: 3 correct, 2 wrong." in page
+    assert "12 on average; half of them have 20 or more" in page
+    assert '<a href="marks.csv">marks.csv</a>' in page

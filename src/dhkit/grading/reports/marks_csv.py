@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Sequence
 from itertools import chain
+from pathlib import PurePath
 
 from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks
@@ -15,8 +16,10 @@ from dhkit.grading.reports.sentences import plain, points
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 """First characters of a text that a spreadsheet would compute."""
 _NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error")
+_AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error", "kind")
 """Columns after the points of the quantities."""
+_LATENESS = ("handed in", "before", "late")
+"""Columns of a class whose export says when sheets were handed in: time, points before lateness, lateness."""
 _ORIGIN = ("sheet", "robot", "digest", "version")
 """Last columns: fields of a report that name the file judged and the program that judged it."""
 
@@ -41,6 +44,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     """Return the marks of sheets as CSV text, in the order given."""
     all_marks = chain.from_iterable(sheet.quantities for sheet in marks)
     quantities = list(dict.fromkeys(mark.name for mark in all_marks))
+    lateness = _LATENESS if any(report.handed_in for report in reports) else ()
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(
@@ -48,6 +52,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             "student",
             "points",
             "most",
+            *lateness,
             *(cell(plain(name)) for name in quantities),
             *_AFTER_POINTS,
             *_ORIGIN,
@@ -59,6 +64,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             report.student,
             points(sheet.points),
             points(sheet.most),
+            *((report.handed_in, points(sheet.before), sheet.late) if lateness else ()),
             *(by_quantity.get(quantity, "") for quantity in quantities),
             report.verdict.value,
             ", ".join(f"{name} = {value:g}" for name, value in report.at_values.items()),
@@ -66,6 +72,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             "; ".join(report.left_out),
             " ".join(dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)),
             report.fault,
+            PurePath(report.sheet or "").suffix.removeprefix("."),
             *(getattr(report, name) or "" for name in _ORIGIN),
         ]
         writer.writerow([cell(plain(text)) for text in row])

@@ -18,6 +18,9 @@ from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.reports.notes import note_text
 from dhkit.grading.rubric import Feedback
 
+_MOST_REPEATED = 5
+"""Students with several sheets who are named one by one; more are counted."""
+
 
 def plain(text: str, most: int = BOUNDS.shown_characters) -> str:
     """Return text as one line of at most ``most`` printable characters; see :func:`dhkit.display.plain`."""
@@ -32,6 +35,11 @@ def points(number: float) -> str:
 def points_of(mark: Mark | Marks) -> str:
     """Return the points given and the points possible, such as ``2.5 of 10``."""
     return f"{points(mark.points)} of {points(mark.most)}"
+
+
+def lateness_of(marks: Marks) -> str:
+    """Return the points before lateness and how late a sheet is, in parentheses; empty if it is in time."""
+    return f" ({points(marks.before)} before; {plain(marks.late)})" if marks.late else ""
 
 
 def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
@@ -68,7 +76,7 @@ def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
 def summary(report: GradeReport, marks: Marks) -> str:
     """Return a sheet's verdict and points in one line, or why the sheet could not be judged."""
     verdict = f"unreadable: {plain(report.error)}" if report.error else plain(report.conclusion)
-    return f"{verdict} ({points_of(marks)} points)"
+    return f"{verdict} ({points_of(marks)} points){lateness_of(marks)}"
 
 
 def fault_of(report: GradeReport) -> str:
@@ -156,12 +164,18 @@ def _repeated_students(reports: Sequence[GradeReport]) -> Iterator[str]:
     for report in reports:
         if report.student:
             sheets.setdefault(report.student, []).append(PurePath(report.sheet or "").name)
-    for student, names in sheets.items():
-        if len(names) > 1:
-            yield (
-                f"{plain(student, 60)} has {len(names)} sheets ({plain(', '.join(names), 200)}): "
-                "each is judged and has a row of its own, and none is preferred"
-            )
+    several = {student: names for student, names in sheets.items() if len(names) > 1}
+    if len(several) > _MOST_REPEATED:
+        yield (
+            f"{len(several)} students have several sheets: each is judged and has a row of its own, and none is "
+            "preferred (--keep best chooses)"
+        )
+        return
+    for student, names in several.items():
+        yield (
+            f"{plain(student, 60)} has {len(names)} sheets ({plain(', '.join(names), 200)}): "
+            "each is judged and has a row of its own, and none is preferred"
+        )
 
 
 def mistake_counts(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:

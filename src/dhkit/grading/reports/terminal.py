@@ -79,7 +79,7 @@ def terminal_class(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> Re
         table.add_row(
             Text(plain(report.student, 60)),
             Text(plain(report.conclusion), _STYLES[report.verdict]),
-            Text(points_of(mark)),
+            Text(points_of(mark) + sentences.lateness_of(mark)),
             Text(sentences.fault_of(report) if report.error else plain(report.sheet or "", 120)),
         )
     lines = [Text(line, style="yellow") for line in sentences.class_warnings(reports)]

@@ -6,9 +6,11 @@ import csv
 import io
 import re
 import unicodedata
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from dhkit.cached_property import cached_property
 from dhkit.description.files import read_bounded
 from dhkit.errors import AnswerError
 from dhkit.grading.bounds import BOUNDS
@@ -35,10 +37,50 @@ class Students:
         Their ids, in the order of the file.
     column
         Heading of the column that was read; empty for a list without columns.
+    rows
+        All cells of each student's row: other names, numbers and addresses.
     """
 
     ids: tuple[str, ...]
     column: str = ""
+    rows: tuple[tuple[str, ...], ...] = ()
+
+    def find(self, names: Iterable[str]) -> str:
+        """Return the student in whose row one of some names stands; empty if there is none, or more than one.
+
+        Case, punctuation and the word ``Participant`` of Moodle do not count: a row with ``Lovelace, Ada`` is found by
+        Canvas's ``lovelaceada``.
+
+        Parameters
+        ----------
+        names
+            Names by which an export tells a student, of which the first that is in one row counts.
+
+        Returns
+        -------
+        str
+            The student's id.
+        """
+        for name in names:
+            found = self._by_cell.get(_letters(name), set())
+            if len(found) == 1:
+                return next(iter(found))
+        return ""
+
+    @cached_property
+    def _by_cell(self) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {}
+        for student, row in zip(self.ids, self.rows, strict=True):
+            for cell in row:
+                if _letters(cell):
+                    found.setdefault(_letters(cell), set()).add(student)
+        return found
+
+
+def _letters(text: str) -> str:
+    """Return a name's letters and digits alone, in one case."""
+    text = unicodedata.normalize("NFC", text).casefold().strip().removeprefix("participant ")
+    return "".join(character for character in text if _is_letter(character))
 
 
 def student_id(text: str) -> str:
@@ -98,6 +140,7 @@ def read_students(path: Path) -> Students:
         rows = rows[1:]
 
     found: dict[str, str] = {}
+    kept: list[tuple[str, ...]] = []
     for line, row in rows:
         if row[0].strip().casefold() == _CANVAS_POINTS:
             continue
@@ -114,11 +157,12 @@ def read_students(path: Path) -> Students:
             twice = "twice" if other == student else f"is also there as {other}"
             raise AnswerError(f"{place}: student {student} {twice}; expected each once")
         found[student.casefold()] = student
+        kept.append(tuple(row))
         if len(found) > BOUNDS.sheets:
             raise AnswerError(f"{path}: more than {BOUNDS.sheets} students")
     if not found:
         raise AnswerError(f"{path}: no student; expected an id a line, or a table with headings")
-    return Students(tuple(found.values()), heading)
+    return Students(tuple(found.values()), heading, tuple(kept))
 
 
 def _rows(path: Path, text: str) -> list[tuple[int, list[str]]]:
