@@ -371,7 +371,7 @@ def press_ctrl_c():
 def test_other_folders_are_left_alone(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "note").write_text("keep me")
-    with pytest.raises(DescriptionError, match="mine: not a Zarr group"):
+    with pytest.raises(DescriptionError, match="mine: not a workspace of dhkit"):
         scale.save_workspace(PLANAR.workspace(100), tmp_path / "mine")
     with pytest.raises(ValueError, match="keeps to one point"):
         scale.save_workspace(Arm.from_dh([(0, 0.5, 0, 0)]).workspace(10), tmp_path / "point")
@@ -402,7 +402,7 @@ def test_the_command_says_the_same_with_a_scheduler(client, tmp_path, monkeypatc
         (["--samples", "1e-3"], "not a whole number from 1 to 1e+12, such as 100000 or 1e9"),
         (["--samples", "1e13"], "not a whole number"),
         (["--scheduler", "cake"], "scheduler 'cake': expected an address"),
-        (["--zarr", "taken"], "taken: not a Zarr group"),
+        (["--zarr", "taken"], "taken: not a workspace of dhkit"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(arguments, complaint, tmp_path, monkeypatch, capsys):

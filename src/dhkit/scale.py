@@ -344,7 +344,7 @@ def save_workspace(space: Workspace, path: str | Path) -> Path:
     space
         A workspace; its tool must not keep to one point.
     path
-        Folder to write. A Zarr group that is there is replaced, and nothing else.
+        Folder to write. A workspace that is there is replaced, and nothing else.
 
     Returns
     -------
@@ -356,7 +356,7 @@ def save_workspace(space: Workspace, path: str | Path) -> Path:
     MissingPackageError
         The extra ``scale`` is not installed.
     DescriptionError
-        The folder is there and not a Zarr group, or cannot be made.
+        The folder is there and not a workspace of dhkit, or cannot be made.
     ValueError
         The tool keeps to one point.
 
@@ -405,11 +405,15 @@ def check_zarr_place(path: Path) -> None:
     MissingPackageError
         The extra ``scale`` is not installed.
     DescriptionError
-        The path is there and not a Zarr group, or its folder cannot be written to.
+        The path is there and not a workspace of dhkit, or its folder cannot be written to.
     """
-    _dask("zarr")
-    if path.exists() and not (path / "zarr.json").is_file():
-        raise DescriptionError(f"{path}: not a Zarr group; expected one, or a path that is free")
+    zarr = _dask("zarr")
+    if path.exists():
+        is_group = (path / "zarr.json").is_file()
+        if not is_group or "dhkit_version" not in zarr.open(path, mode="r").attrs:
+            raise DescriptionError(
+                f"{path}: not a workspace of dhkit; expected one, or a free path"
+            )
     check_place(path / "zarr.json")
 
 

@@ -251,6 +251,28 @@ def test_a_bad_task_is_refused_in_one_line(task, change, message):
         assert "\n" not in str(caught.value)
 
 
+def test_two_tasks_have_two_identities(tmp_path):
+    identities = set()
+    for name, asked in (("week1", '["M", "g"]'), ("week2", '["M", "g"]'), ("week3", '["g"]')):
+        (tmp_path / name).mkdir()
+        path = tmp_path / name / "task.toml"
+        path.write_text(TASK.replace('["M", "g"]', asked))
+        info = json.loads(pack("prairielearn", path).files["info.json"])
+        assert info["title"].startswith(f"{name}: planar2r")
+        quiz = next(file for file in pack("canvas", path).files if file != "imsmanifest.xml")
+        identities |= {info["uuid"], quiz}
+        assert f"source/{name}/{name}.ipynb" in pack("nbgrader", path).files
+    assert len(identities) == 6
+
+
+def test_a_table_that_is_asked_for_is_not_shown(tmp_path):
+    path = tmp_path / "table.toml"
+    path.write_text('robot = "puma560_cao"\n[task]\nasked = ["dh"]\n')
+    page = pack("prairielearn", path).files["question.html"].decode()
+    assert "Denavit-Hartenberg table" in page
+    assert "-0.41" not in page and "16.39" not in page
+
+
 def test_a_wheel_of_something_else_is_refused(tmp_path, task):
     other = tmp_path / "numpy-2.0-py3-none-any.whl"
     other.write_bytes(b"")

@@ -78,6 +78,8 @@ def test_answers_are_escaped(data):
     [
         "<dhkit-answer></dhkit-answer>",
         '<dhkit-answer quantity="g" task="../task.toml"></dhkit-answer>',
+        '<dhkit-answer quantity="g2"></dhkit-answer>',
+        '<dhkit-answer quantity="V"></dhkit-answer>',
     ],
 )
 def test_a_bad_element_is_refused_when_a_variant_is_made(data, markup):

@@ -8,6 +8,7 @@ import venv
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 from nbclient import NotebookClient
 
@@ -104,11 +105,11 @@ def test_nbgraders_cells_have_its_metadata(task, tmp_path):
 
 
 def test_an_answer_does_not_hide_a_parameter(tmp_path):
-    path = tmp_path / "task.toml"
+    path = tmp_path / "dynamics.toml"
     path.write_text(TASK)
     setup = next(
         cell.source
-        for cell in notebook_of(pack("otter", path), "task.ipynb").cells
+        for cell in notebook_of(pack("otter", path), "dynamics.ipynb").cells
         if "sympy" in cell.source
     )
     assert 'g_ = sp.Symbol("g")' in setup
@@ -118,8 +119,28 @@ def test_an_answer_does_not_hide_a_parameter(tmp_path):
 def test_a_task_that_asks_for_nothing_is_refused(tmp_path):
     path = tmp_path / "task.toml"
     path.write_text('robot = "planar2r"\n')
-    with pytest.raises(AnswerError, match="asked: missing"):
+    with pytest.raises(AnswerError, match="asked: found nothing"):
         pack("otter", path)
+
+
+def test_tables_and_functions_are_refused_where_they_cannot_be_judged(tmp_path):
+    path = tmp_path / "task.toml"
+    path.write_text(TASK.replace('"g"]', '"g", "ik"]'))
+    with pytest.raises(AnswerError, match="asked: found ik; notebooks take"):
+        pack("nbgrader", path)
+    path.write_text(TASK.replace("[rubric]", "values = false\n[rubric]", 1))
+    numeric = check(path, "M", lambda q: np.zeros((2, 2)))
+    assert numeric.points == 0
+    assert "asks for formulas" in numeric.report.error
+
+
+def test_otter_weighs_entries_as_the_rubric_does(tmp_path):
+    path = tmp_path / "task.toml"
+    path.write_text(TASK + "M21 = 0\n")
+    scope: dict = {}
+    exec(pack("otter", path).files["tests/M.py"].decode(), scope)
+    points = [case["points"] for case in scope["test"]["suites"][0]["cases"]]
+    assert points == pytest.approx([40 / 9, 40 / 9, 0, 40 / 9])
 
 
 @pytest.fixture(scope="module")

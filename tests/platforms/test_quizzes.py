@@ -4,12 +4,14 @@ import io
 import re
 import xml.etree.ElementTree as ET
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pinocchio
 import pytest
 
-from dhkit import Arm
+from dhkit import Arm, pose
+from dhkit.description import to_toml
 from dhkit.errors import AnswerError
 from dhkit.platforms import pack
 from dhkit.platforms.contents import Task
@@ -61,7 +63,10 @@ def truth(arm, quantity, q, qd, qdd):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_answers_are_pinocchios(tmp_path, robot):
     task = Task.read(task_of(tmp_path, robot, ("M", "g", "h", "tau", "K")))
-    arm = Arm.load(robot)
+    # The statement has the links' bodies, and no rotors.
+    description = Arm.load(robot).description
+    joints = tuple(replace(joint, drive=None) for joint in description.joints)
+    arm = Arm(replace(description, joints=joints, couplings=()))
     for question in questions(task, 5, 1):
         values = truth(arm, question.quantity, *state(question.text, arm.n))
         name = re.search(r"What is ([\w]+)", question.text)[1]
@@ -91,6 +96,22 @@ def test_units_are_those_of_joints_and_entries(tmp_path):
     assert "tau2, in N" in asked
     assert any(one.startswith("J") and "in m/rad" in one for one in asked)
     assert any(one.startswith("T") and one.endswith("in m") for one in asked)
+
+
+def test_a_question_can_be_solved_from_its_page(tmp_path):
+    texts = [q.text for q in questions(Task.read(task_of(tmp_path, "puma560")), 1, 0)]
+    assert all("Rz(theta) Tz(d)" in text for text in texts)
+    moving = [text for text in texts if "kg m²" in text]
+    assert len(moving) == 5
+    assert all("centre of mass" in text and "Free fall" in text for text in moving)
+
+
+def test_the_place_of_the_base_is_printed(tmp_path):
+    raised = to_toml(Arm.load("planar2r").with_base(pose([0, 0, 0.5])).description)
+    (tmp_path / "raised.toml").write_text(raised)
+    (text,) = [q.text for q in questions(Task.read(task_of(tmp_path, "raised.toml", ("T",))), 1, 0)]
+    assert "Frame 0 lies in the world" in text
+    assert "0.5" in text
 
 
 def test_variants_differ_and_are_repeatable(tmp_path):

@@ -468,16 +468,21 @@ def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> l
 
 def _latex_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table in LaTeX."""
-    rows = [" & ".join(map(escaped, line)) + r" \\" for line in cells]
+    rows = [" & ".join(map(_latex_cell, line)) + r" \\" for line in cells]
     return [
         rf"\begin{{tabular}}{{{'l' * len(columns)}}}",
         r"\toprule",
-        " & ".join(map(escaped, columns)) + r" \\",
+        " & ".join(map(_latex_cell, columns)) + r" \\",
         r"\midrule",
         *rows,
         r"\bottomrule",
         r"\end{tabular}",
     ]
+
+
+def _latex_cell(text: str) -> str:
+    """Return a cell for LaTeX; the micro sign of times is a command there."""
+    return r"\textmu{}".join(map(escaped, text.split("µ")))
 
 
 def _with_lists(value: Any) -> Any:

@@ -76,14 +76,18 @@ def variants(
         more = f" and {len(same) - MOST_LISTED} more" if len(same) > MOST_LISTED else ""
         notes.append(f"the same variant: {pairs}{more}")
     notes += _size_notes(varied)
-    if (earlier := earlier_key(output)) is not None and (changed := earlier.changed(drawn)):
-        notes.append(f"{output}: other variants than before: {_listed(changed)}")
+    if (earlier := earlier_key(output)) is not None:
+        if changed := earlier.changed(drawn):
+            notes.append(f"{output}: other variants than before: {_listed(changed)}")
+        present = {variant.student for variant in drawn}
+        if dropped := [student for student in earlier.variants if student not in present]:
+            notes.append(f"{output}: no longer there: {_listed(dropped)}")
     if varied.task.task.in_letters and len(varied.samples) == 1:
         notes.append(
             "answers in numbers do not pass (values = false): all students have one answer"
         )
     if "dh" in varied.task.task.asked:
-        notes.append("the table that is asked for stands in the statement and in the robot file")
+        notes.append("the table that is asked for stands in the robot file")
     if not can_print():
         notes.append("no statement.pdf: the package typst is not installed")
 

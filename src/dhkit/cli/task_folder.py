@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import tomlkit
@@ -140,9 +141,11 @@ def student_files(variant: Variant, task: AnswerSheet) -> dict[str, bytes]:
     empty = template(description, ROBOT, task)
     sheet = _STUDENT_LINE.sub(lambda _: f"student = {student}", empty, count=1)
     document = statement(description, task, variant.student, SHEET, image)
+    # Notes of library robots may say what is asked.
+    own = replace(description, notes="")
     files = {
         SHEET: sheet.encode(),
-        ROBOT: to_toml(description).encode(),
+        ROBOT: to_toml(own).encode(),
         "picture.png": image,
         "statement.html": html_text(document).encode(),
     }

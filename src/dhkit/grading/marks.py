@@ -12,6 +12,9 @@ from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.grading.lateness import Lateness
 from dhkit.grading.rubric import Credit, Rubric
 
+_LAST_ROW = 3
+"""Index of the last row of a pose."""
+
 
 @dataclass(frozen=True)
 class Mark:
@@ -162,7 +165,11 @@ def _quantity_weights(report: GradeReport, rubric: Rubric) -> dict[str, Fraction
 
 
 def _entry_weight(entry: Entry, rubric: Rubric) -> Fraction:
-    return _exact(rubric.weights.get(entry.name, 1.0)) if entry.index else Fraction(1)
+    """Return the weight of an entry in its quantity; the last row of a pose, which everybody knows, has none."""
+    if not entry.index:
+        return Fraction(1)
+    is_known = entry.quantity.startswith(("A", "T")) and entry.index[0] == _LAST_ROW
+    return _exact(rubric.weights.get(entry.name, 0.0 if is_known else 1.0))
 
 
 def _part(entry: Entry, report: GradeReport, rubric: Rubric) -> Fraction:
@@ -194,7 +201,9 @@ def _reasons(
 ) -> list[tuple[Fraction, str]]:
     """Return the shares that a wrong entry may get, with their rules."""
     mistakes = [one for one in diagnosis if one.mistake and entry.name in one.entries]
-    reasons = [(_exact(credit.follow_on), f"follows from {entry.follows}")] if entry.follows else []
+    # Zeros follow from zeros: that is no work.
+    has_work = bool(entry.follows) and entry.read != "0"
+    reasons = [(_exact(credit.follow_on), f"follows from {entry.follows}")] if has_work else []
     if any(one.mistake == "other_frames" for one in mistakes):
         reasons.append((_exact(credit.other_frames), "right in other frames"))
     elif mistakes:

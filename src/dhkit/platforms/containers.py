@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import uuid
 from collections.abc import Mapping
@@ -10,6 +9,7 @@ from collections.abc import Mapping
 from dhkit.grading.empty_sheet import template
 from dhkit.grading.variants import VariantKey
 from dhkit.platforms.contents import Installation, Package, Task, key_contents
+from dhkit.report.statement import task_html
 
 KEY = "key"
 """Folder of a package that has the key of variants."""
@@ -44,8 +44,7 @@ FROM python:3.12-slim
 """
 _QUESTION = """\
 <pl-question-panel>
-  <p>Derive {asked} of the arm <code>{robot}</code>.</p>
-{table}
+{statement}
   <p>Write each answer as text into the sheet below; what stays empty is not handed in.</p>
   <pl-file-editor file-name="{answer}" ace-mode="ace/mode/toml" source-file-name="{answer}"></pl-file-editor>
 </pl-question-panel>
@@ -96,8 +95,8 @@ def prairielearn_package(task: Task, installation: Installation, image: str) -> 
     """
     info = {
         # The same task is the same question, also after it was packed again.
-        "uuid": str(uuid.uuid5(uuid.NAMESPACE_URL, f"dhkit:{task.name}:{task.description.digest}")),
-        "title": f"{task.description.name}: {', '.join(task.asked) or 'equations'}",
+        "uuid": str(uuid.uuid5(uuid.NAMESPACE_URL, f"dhkit:{task.digest}")),
+        "title": task.title,
         "topic": "Robot arms",
         "tags": ["dhkit"],
         "type": "v3",
@@ -112,9 +111,7 @@ def prairielearn_package(task: Task, installation: Installation, image: str) -> 
         },
     }
     question = _QUESTION.format(
-        asked=html.escape(", ".join(task.asked) or "the quantities of the sheet"),
-        robot=html.escape(task.description.name),
-        table=task.description._repr_html_(),
+        statement=task_html(task.description, task.sheet),
         answer=_ANSWER_FILE,
     )
     copy = f"COPY {installation.wheel_name} ./\n" if installation.wheel_name else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 import shutil
@@ -93,7 +94,7 @@ class Task:
     """An instructor's task that is complete in itself: its file, and the robot's file where it has one."""
 
     name: str
-    """Name of the task: that of its file."""
+    """Name of the task: that of its file, or of its folder for a file task.toml."""
     sheet: AnswerSheet
     description: Description
     """The robot."""
@@ -131,7 +132,9 @@ class Task:
                     f"{path}: robot: {sheet.robot!r}; expected another name, below the task's folder"
                 )
             files[str(place)] = _content(path.parent / sheet.robot, _ROBOT_BYTES, "a robot")
-        return cls(path.stem, sheet, description, _rubric_of(sheet, path), files)
+        # Courses have a folder for each task, and task.toml in it.
+        name = path.parent.name if path.stem == "task" and path.parent.name else path.stem
+        return cls(name, sheet, description, _rubric_of(sheet, path), files)
 
     @classmethod
     def of_student(cls, key: VariantKey, student: str) -> Task:
@@ -145,6 +148,20 @@ class Task:
         sheet = read_task(key.task)
         rubric = _rubric_of(sheet, key.task)
         return cls(key.task.stem, sheet, key.robot_of(student), rubric, {})
+
+    @property
+    def title(self) -> str:
+        """A line that tells the task from others: its name, its robot and what is asked."""
+        return f"{self.name}: {self.description.name}, {', '.join(self.asked) or 'equations'}"
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the task's name, file and robot, hexadecimal: two tasks have two."""
+        parts = (
+            self.name.encode(),
+            *(x for pair in sorted(self.files.items()) for x in (pair[0].encode(), pair[1])),
+        )
+        return hashlib.sha256(b"\0".join(parts) + self.description.digest.encode()).hexdigest()
 
     @property
     def asked(self) -> tuple[str, ...]:

@@ -70,6 +70,10 @@ def check(task: str | Path, quantity: str, value: object) -> Check:
         key: value for key, value in document.get("task", {}).items() if key not in _OF_FILES
     }
     try:
+        if callable(value) and read.sheet.task.in_letters:
+            raise AnswerError(
+                f"{quantity}: found a function; the task asks for formulas in letters"
+            )
         report = grade_answers(
             read.description, {quantity: value}, document.get("names"), requirements, read.rubric
         )

@@ -6,9 +6,11 @@ import json
 from collections.abc import Sequence
 from itertools import product
 
+from dhkit.errors import AnswerError
 from dhkit.grading.answers.sheet import shape_of
 from dhkit.grading.grade_report import entry_name
 from dhkit.platforms.contents import Installation, Package, Task
+from dhkit.report.statement import task_html
 
 _KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 _SETUP_CELL = """\
@@ -70,7 +72,20 @@ def nbgrader_package(task: Task, installation: Installation) -> Package:
 
 
 def _quantities(task: Task) -> Sequence[str]:
-    return [name for name in task.asked if name not in ("dh", "ik")]
+    """Return the quantities of a notebook.
+
+    Raises
+    ------
+    AnswerError
+        The task asks for tables or inverse kinematics, which are not assigned to a name.
+    """
+    tables = [name for name in task.asked if name in ("dh", "ik")]
+    if tables or not task.asked:
+        found = ", ".join(tables) or "nothing"
+        raise AnswerError(
+            f"{task.name}: asked: found {found}; notebooks take quantities such as M, g, T"
+        )
+    return task.asked
 
 
 def _entries(task: Task, quantity: str) -> list[str]:
@@ -85,13 +100,15 @@ def _entries(task: Task, quantity: str) -> list[str]:
 def _otter_test(task: Task, quantity: str) -> str:
     """Return a test file of Otter: a case for each entry, all of the same worth."""
     entries = _entries(task, quantity)
+    weights = {name: task.rubric.weights.get(name, 1.0) for name in entries}
+    whole = sum(weights.values()) or 1.0
     call = f'check("task.toml", "{quantity}", {quantity})'
     cases = [
         {
             "code": f">>> from dhkit.platforms.notebook_checks import check\n>>> {call}.passes({name!r})\nTrue",
             "hidden": False,
             "locked": False,
-            "points": task.points_of(quantity) / len(entries),
+            "points": task.points_of(quantity) * weights[name] / whole,
             "failure_message": f"{name} is not right",
         }
         for name in entries
@@ -112,8 +129,7 @@ def _setup(task: Task) -> str:
 
 
 def _title(task: Task) -> dict[str, object]:
-    description = task.description
-    return _text(f"# {description.name}\n\n{description._repr_html_()}")
+    return _text(f"# {task.title}\n\n{task_html(task.description, task.sheet)}")
 
 
 def _text(source: str) -> dict[str, object]:

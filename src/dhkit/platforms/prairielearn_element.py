@@ -16,6 +16,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, NoReturn
 
+from dhkit.platforms.contents import Task
 from dhkit.platforms.notebook_checks import Check, check
 
 _MAX_CHARACTERS = 20_000
@@ -27,8 +28,10 @@ Data = dict[str, Any]
 
 def prepare(element_html: str, data: Data) -> None:
     """Check the element's attributes when a variant is made."""
-    _quantity(element_html)
-    _task(element_html, data)
+    quantity = _quantity(element_html)
+    asked = Task.read(_task(element_html, data)).asked
+    if quantity not in asked:
+        raise ValueError(f"dhkit-answer: quantity: found {quantity!r}; expected {', '.join(asked)}")
 
 
 def render(element_html: str, data: Data) -> str:

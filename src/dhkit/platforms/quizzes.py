@@ -5,24 +5,25 @@ from __future__ import annotations
 import html
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from hashlib import sha256
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.display import html_table
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.sheet_values import AnswerSheet, Requirements
 from dhkit.grading.grade_report import entry_name
 from dhkit.platforms.contents import Package, Task
+from dhkit.report.statement import task_html
 
 if TYPE_CHECKING:
     from dhkit.arm import Arm
 
 ASKED = ("T", "J", "M", "g", "h", "tau", "K")
 """Quantities that have one value at a state; C and V depend on a choice, and tables are no numbers."""
+NO_ANSWERS = AnswerSheet()
 TOLERANCE = 1e-3
 """Relative error up to which a number is right: answers have four significant digits."""
 _SMALLEST = 1e-2
@@ -76,12 +77,18 @@ def questions(task: Task, count: int, seed: int) -> list[Question]:
         )
     from dhkit.arm import Arm
 
-    arm = Arm(task.description)
+    arm = Arm(_without_drives(task.description))
     return [
         _question(task, arm, quantity, k, np.random.default_rng([seed, ASKED.index(quantity), k]))
         for quantity in asked
         for k in range(count)
     ]
+
+
+def _without_drives(description: Description) -> Description:
+    """Return an arm without rotors: questions give the links' bodies alone."""
+    joints = tuple(replace(joint, drive=None) for joint in description.joints)
+    return replace(description, joints=joints, couplings=())
 
 
 def _question(
@@ -183,32 +190,10 @@ def _text(
         )
         lines.append(f"<p>{numbers}</p>")
     asked = f"{entry}, in {unit}" if unit else entry
-    bodies = "" if quantity in ("T", "J") else _bodies(description)
+    about = task_html(description, replace(NO_ANSWERS, task=Requirements(asked=(quantity,))))
     return (
-        f"{description._repr_html_()}{bodies}<p>What is {html.escape(asked)}, at this state?</p>{''.join(lines)}"
+        f"{about}<p>What is {html.escape(asked)}, at this state?</p>{''.join(lines)}"
         "<p>Give at least four significant digits.</p>"
-    )
-
-
-def _bodies(description: Description) -> str:
-    """Return a table of the links' bodies as HTML, in the axes of the links' frames."""
-    numbers = description.numbers
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    head = ["link", "mass [kg]", "centre of mass [m]"]
-    head += [f"I{'xyz'[i]}{'xyz'[j]} [kg m²]" for i, j in pairs]
-    rows = [
-        [
-            str(link + 1),
-            f"{numbers.mass[link]:.6g}",
-            ", ".join(f"{x + 0.0:.6g}" for x in numbers.com[link]),
-            *(f"{numbers.inertia[link, i, j] + 0.0:.6g}" for i, j in pairs),
-        ]
-        for link in range(description.n)
-    ]
-    gravity = ", ".join(f"{x + 0.0:g}" for x in numbers.gravity)
-    return (
-        f"{html_table(head, rows)}<p>Inertia is about the centre of mass, in the axes of the link's frame. "
-        f"Gravity is ({gravity}) m/s² in the world.</p>"
     )
 
 
@@ -220,7 +205,7 @@ def moodle_package(task: Task, drawn: Sequence[Question]) -> Package:
     quiz = ET.Element("quiz")
     for quantity, variants in groupby(drawn, lambda question: question.quantity):
         category = ET.SubElement(quiz, "question", type="category")
-        _with_text(category, "category", f"$course$/dhkit/{task.name}/{quantity}")
+        _with_text(category, "category", f"$course$/dhkit/{task.title}/{quantity}")
         for question in variants:
             item = ET.SubElement(quiz, "question", type="numerical")
             _with_text(item, "name", question.name)
@@ -244,9 +229,9 @@ def canvas_package(task: Task, drawn: Sequence[Question]) -> Package:
 
     Source: IMS QTI 1.2 ASI and Content Packaging; Canvas' numerical questions and question groups.
     """
-    ident = f"dhkit_{sha256(f'{task.name} {task.description.digest}'.encode()).hexdigest()[:24]}"
+    ident = f"dhkit_{task.digest[:24]}"
     root = ET.Element("questestinterop", xmlns=_QTI)
-    assessment = ET.SubElement(root, "assessment", ident=ident, title=task.name)
+    assessment = ET.SubElement(root, "assessment", ident=ident, title=task.title)
     whole = ET.SubElement(assessment, "section", ident="root_section")
     for quantity, variants in groupby(drawn, lambda question: question.quantity):
         group = ET.SubElement(whole, "section", ident=f"{ident}_{quantity}", title=quantity)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from dhkit.description import Body, Convention, Description, Placement
 from dhkit.grading.answers.sheet import JACOBIAN_ROWS
 from dhkit.grading.answers.sheet_values import AnswerSheet
@@ -19,6 +21,7 @@ from dhkit.report.document import (
     Items,
     Paragraph,
     Table,
+    html_blocks,
 )
 from dhkit.report.sections.kinematics import table_block
 from dhkit.report.sections.robot import ready
@@ -78,6 +81,21 @@ def statement(
     )
 
 
+def task_html(description: Description, task: AnswerSheet) -> str:
+    """Return what is asked and the arm as HTML, for the page of a teaching platform.
+
+    A table that is asked for is not shown.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    task
+        The instructor's task.
+    """
+    return html_blocks([*_asked(task), *_numbers(description, task)])
+
+
 def _asked(task: AnswerSheet) -> Iterator[Block]:
     required = task.task
     if required.asked:
@@ -116,16 +134,19 @@ def _meaning(quantity: str) -> str:
     return (MEANINGS | _FURTHER_MEANINGS)[quantity]
 
 
-def _arm(description: Description, task: AnswerSheet, picture: bytes) -> Iterator[Block]:
+def _numbers(description: Description, task: AnswerSheet) -> Iterator[Block]:
+    """Yield the arm in numbers: table, places of base and tool, parameters and bodies."""
     standard = description.convention is Convention.STANDARD
     order = "Rz(theta) Tz(d) Tx(a) Rx(alpha)" if standard else "Rx(alpha) Tx(a) Rz(theta) Tz(d)"
     yield Paragraph(
         f"The table follows the {'standard (distal)' if standard else 'modified (Craig, proximal)'} convention: "
         f"{order} is the transform of a row."
     )
-    yield table_block(description, "the arm")
-    if tool := _tool(description):
-        yield Paragraph(tool)
+    if "dh" not in task.task.asked:
+        yield table_block(description, "the arm")
+        for sentence in (_base(description), _tool(description)):
+            if sentence:
+                yield Paragraph(sentence)
     if description.parameters:
         rows = [
             (name, value.text if value.symbols else f"{float(value):.15g}")
@@ -148,6 +169,10 @@ def _arm(description: Description, task: AnswerSheet, picture: bytes) -> Iterato
         )
         gravity = ", ".join(entry.text for entry in description.gravity)
         yield Paragraph(f"Free fall in the world frame: ({gravity}) m/s².")
+
+
+def _arm(description: Description, task: AnswerSheet, picture: bytes) -> Iterator[Block]:
+    yield from _numbers(description, task)
     name, q = ready(description)
     yield Figure(
         (Image(picture),),
@@ -155,6 +180,15 @@ def _arm(description: Description, task: AnswerSheet, picture: bytes) -> Iterato
         f"{joint_values(description, q)}",
         0.7,
     )
+
+
+def _base(description: Description) -> str:
+    """Return a sentence on the place of frame 0; empty if it is the world's."""
+    T = description.numbers.T_world_base
+    if np.array_equal(T, np.eye(4)):
+        return ""
+    rows = "; ".join(", ".join(f"{x + 0.0:.6g}" for x in row) for row in T[:3])
+    return f"Frame 0 lies in the world at the pose with the rows ({rows}), m."
 
 
 def _tool(description: Description) -> str:

@@ -4,7 +4,7 @@ A document is a tree of blocks: headings, paragraphs, formulas, tables, figures,
 printer escapes them, so that names and file names of others are shown as they are typed and do nothing else.
 """
 
-from dhkit.report.document.html import html_text
+from dhkit.report.document.html import html_blocks, html_text
 from dhkit.report.document.latex import latex_text
 from dhkit.report.document.pdf import Pdf, pdf
 from dhkit.report.document.tree import (
@@ -39,6 +39,7 @@ __all__ = [
     "Prompt",
     "References",
     "Table",
+    "html_blocks",
     "html_text",
     "latex_text",
     "pdf",

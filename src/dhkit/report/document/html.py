@@ -66,6 +66,18 @@ def html_text(document: Document) -> str:
     return page(document.title, "\n".join(body), MATH_STYLE + _STYLE, _POLICY)
 
 
+def html_blocks(blocks: Sequence[Block]) -> str:
+    """Return blocks as HTML for a page of somebody else, without headings of its own and without styles.
+
+    Examples
+    --------
+    >>> html_blocks([Paragraph("a < b")])
+    '<p>a &lt; b</p>'
+    """
+    numbers = _Numbers()
+    return "\n".join(line for block in blocks for line in _block(block, numbers))
+
+
 class _Numbers:
     """Counts headings, tables and figures."""
 
