@@ -184,8 +184,8 @@ def is_regular(arm: Arm, q: Array) -> NDArray[np.bool_]:
     """Return whether states (N, n) are well away from singular ones, shape (N,)."""
     J = arm.jacobian(q)
     J[:, :3] /= np.linalg.norm(arm.fk(q)[:, :3, 3], axis=1).max()
-    smallest: Array = np.linalg.svd(J, compute_uv=False)[:, -1]
-    return smallest > LEAST_SINGULAR_VALUE
+    smallest = np.linalg.svd(J, compute_uv=False)[:, -1]
+    return np.asarray(smallest > LEAST_SINGULAR_VALUE)
 
 
 def near_singular(arm: Arm, rng: np.random.Generator) -> Iterator[Array]:
