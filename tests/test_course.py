@@ -123,6 +123,7 @@ def entry(answers, name):
     return value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("week", WEEKS, ids=name_of)
 def test_the_lab_assignment_can_be_solved_and_is_marked(week, tmp_path):
     assignment = Assignment.read(week / "lab.toml")
