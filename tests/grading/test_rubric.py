@@ -6,7 +6,9 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, strategies as st
 
+from dhkit.description import library_robot
 from dhkit.errors import AnswerError
+from dhkit.grading import grade_answers
 from dhkit.grading.grade_report import Diagnosis, GradeReport, Verdict
 from dhkit.grading.marks import marks
 from dhkit.grading.reports import with_feedback
@@ -227,3 +229,21 @@ def test_verdicts_alone():
         {entry.latex + entry.statement + entry.follows for entry in told.entries},
     ) == ((), {""})
     assert "look at" not in str(told)
+
+
+ZEROS = [["0"] * 4, ["0"] * 4, ["0"] * 4, ["0", "0", "0", "1"]]
+
+
+def test_the_last_row_of_a_pose_counts_nothing_unless_it_has_a_weight():
+    report = grade_answers(library_robot("puma560"), {"T": ZEROS}, explain=False)
+    assert marks(report, Rubric(points=12)).points == 0
+    assert marks(report, Rubric(points=12, weights={"T": 1, "T44": 1})).points > 0
+
+
+def test_zeros_that_follow_from_zeros_get_nothing():
+    arm = library_robot("polar_rp")
+    zeros = {"M": [["0", "0"], ["0", "0"]], "C": [["0", "0"], ["0", "0"]]}
+    report = grade_answers(arm, zeros)
+    given = {mark.name: mark for mark in marks(report, Rubric()).entries}
+    assert not any("follows" in mark.rule for mark in given.values())
+    assert [name for name, mark in given.items() if mark.points] == ["M12", "M21"]
