@@ -7,7 +7,6 @@ those whose results it still held: dask computes them again elsewhere, with the 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
@@ -27,7 +26,7 @@ from dhkit.arm import Arm
 from dhkit.control import BatchResult, Controller, Reference
 from dhkit.control.options import BatchOptions
 from dhkit.description import Array
-from dhkit.description.files import check_place
+from dhkit.description.files import check_place, whole_folder
 from dhkit.errors import DescriptionError, DhkitError, PlanningError, from_checkout
 from dhkit.kernels import kernel_mode
 from dhkit.kinematics import Workspace
@@ -372,9 +371,8 @@ def save_workspace(space: Workspace, path: str | Path) -> Path:
     grid = space.grid
     if grid is None:
         raise ValueError("the tool keeps to one point: it has no grid")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
-        group = zarr.open_group(Path(folder) / "new", mode="w")
+    with whole_folder(path) as folder:
+        group = zarr.open_group(folder, mode="w")
         group.attrs.update(_attributes(space))
         group.create_array("counts", data=grid.counts)
         group.create_array("manipulability", data=grid.manipulability)
@@ -391,9 +389,6 @@ def save_workspace(space: Workspace, path: str | Path) -> Path:
                 axes=flat.projection.axes.tolist(),
                 is_section=flat.projection.is_section,
             )
-        if path.exists():
-            path.rename(Path(folder) / "old")
-        (Path(folder) / "new").rename(path)
     return path
 
 

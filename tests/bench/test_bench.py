@@ -49,7 +49,7 @@ pytestmark = pytest.mark.slow
 
 CLOSE = 1e-13
 """m and rotation entries: a chain of ten products of matrices whose entries are below 3."""
-PEERS = ("eaik", "py_opw_kinematics", "ssik", "roboticstoolbox", "ikpy")
+PEERS = ("eaik", "py_opw_kinematics", "ssik", "roboticstoolbox", "frankik", "ikpy")
 QUICK = (*dhkit_arm.contenders(), *pinocchio.contenders())
 """Contenders that need nothing but dhkit's own dependencies."""
 

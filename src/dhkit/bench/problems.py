@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders
 from dhkit.description import Array
 from dhkit.description.files import read_bounded
-from dhkit.display import html_table, repr_line
+from dhkit.display import html_table, plain, repr_line
 from dhkit.errors import DescriptionError
 
 FORMAT = 1
@@ -33,6 +33,8 @@ CLOSES = 1e-6
 """Largest difference of the pose, m and rad, of joint values that count as a solution."""
 _OWN = ("dhkit", "dhkit, one call")
 """dhkit's ways of calling that are scored."""
+_REASON = 200
+"""Longest reason why a solver took no part, characters."""
 _TIMINGS = 3
 """Runs of which the fastest counts."""
 REACHABLE = ("regular", "near singular", "near limit")
@@ -297,16 +299,10 @@ def _score(problems: Problems, contender: Contender) -> ProblemRow:
         call = task.prepare(count)
         seconds = min(_seconds(call) for _ in range(_TIMINGS))
     except UnavailableError as error:
-        return _without(row, str(error))
+        return replace(row, reason=plain(str(error), _REASON))
     except Exception as error:  # a peer may raise anything
-        return _without(row, f"{type(error).__name__}: {error}")
+        return replace(row, reason=plain(f"{type(error).__name__}: {error}", _REASON))
     return _compared(row, problems, answers, seconds / count)
-
-
-def _without(row: ProblemRow, reason: str) -> ProblemRow:
-    return ProblemRow(
-        row.robot, row.contender, row.own, row.poses, row.known, reason=" ".join(reason.split())
-    )
 
 
 def _seconds(call: Callable[[], object]) -> float:
@@ -336,15 +332,6 @@ def _compared(
         missed[kind] += int((~is_same).sum())
         right = error[error <= CLOSES]
         largest = max(largest, float(right.max(initial=0.0)))
-    return ProblemRow(
-        row.robot,
-        row.contender,
-        row.own,
-        row.poses,
-        row.known,
-        found,
-        missed,
-        invented,
-        largest,
-        seconds,
+    return replace(
+        row, found=found, missed=missed, invented=invented, error=largest, seconds=seconds
     )

@@ -102,9 +102,7 @@ def run(
     The status is NO if dhkit itself, or every contender of a quantity, disagreed, failed or could not be timed;
     INTERRUPTED if Ctrl-C ended the run early. Peers that fail beside dhkit are noted.
     """
-    if output is not None:
-        for file in _files(output):
-            check_place(file)
+    _check_places(output)
     progress = _Progress()
     report = run_bench(
         arm,
@@ -118,13 +116,7 @@ def run(
         targets=targets,
     )
     progress.clear()
-    if output is not None:
-        for file in write(report, output):
-            sys.stderr.write(f"dhkit: wrote {file}\n")
-    if json:
-        print_json(report.json())
-    else:
-        say(str(report))
+    _deliver(report, output, json=json)
     for outcome in report.outcomes:
         if outcome.ending is not Ending.COMPLETE:
             note = "note: " if outcome.ok else ""  # peers failed, and dhkit did not
@@ -137,11 +129,23 @@ def run(
 def run_on_problems(path: Path, output: Path | None, *, json: bool) -> ExitStatus:
     """Score every solver on problems, and print the report; the status is NO if dhkit misses or invents a solution."""
     files = files_in(path)
-    for file in _files(output) if output is not None else ():
-        check_place(file)
+    _check_places(output)
     progress = _Progress()
     report = run_problems(files, progress.show)
     progress.clear()
+    _deliver(report, output, json=json)
+    are_right = all(row.is_right for row in report.rows if row.own)
+    return ExitStatus.FINE if are_right else ExitStatus.NO
+
+
+def _check_places(output: Path | None) -> None:
+    """Refuse an output that cannot be written, before anything is measured."""
+    for file in _files(output) if output is not None else ():
+        check_place(file)
+
+
+def _deliver(report: Report, output: Path | None, *, json: bool) -> None:
+    """Print a report, and write it if there is an output."""
     if output is not None:
         for file in write(report, output):
             sys.stderr.write(f"dhkit: wrote {file}\n")
@@ -149,8 +153,6 @@ def run_on_problems(path: Path, output: Path | None, *, json: bool) -> ExitStatu
         print_json(report.json())
     else:
         say(str(report))
-    are_right = all(row.is_right for row in report.rows if row.own)
-    return ExitStatus.FINE if are_right else ExitStatus.NO
 
 
 def write(report: Report, path: Path) -> tuple[Path, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 import tomlkit
 
 from dhkit.description import to_toml
-from dhkit.description.files import check_place
+from dhkit.description.files import check_place, whole_folder
 from dhkit.errors import AnswerError, MissingPackageError
 from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.empty_sheet import template
@@ -103,26 +102,13 @@ def write_folder(
     progress
         Called with the number of students written so far and the number of all students.
     """
-    parent = folder.absolute().parent
-    parent.mkdir(parents=True, exist_ok=True)
-    # Written under another name and renamed: a folder of this name is complete.
-    with tempfile.TemporaryDirectory(dir=parent, prefix=f".{folder.name}.") as holder:
-        complete = Path(holder) / "made"
+    with whole_folder(folder) as complete:
         for name, content in key_files(varied, task, drawn, seed).items():
             _write(complete / KEY / name, content)
         for done, variant in enumerate(drawn):
             progress(done, len(drawn))
             for name, content in student_files(variant, varied.task).items():
                 _write(complete / STUDENTS / variant.student / name, content)
-        previous = Path(holder) / "previous"
-        if folder.exists():
-            folder.replace(previous)
-        try:
-            complete.replace(folder)
-        except BaseException:
-            if previous.exists():
-                previous.replace(folder)
-            raise
 
 
 def student_files(variant: Variant, task: AnswerSheet) -> dict[str, bytes]:

@@ -6,6 +6,8 @@ import errno
 import os
 import re
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -124,6 +126,52 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Fill a folder under a temporary name beside it, and rename it at the end: a folder of this name is complete.
+
+    An error, or Ctrl-C, leaves the folder that was there before, or none.
+
+    Parameters
+    ----------
+    path
+        Folder to write; one that is there is replaced, and folders above are created.
+
+    Yields
+    ------
+    Path
+        The empty folder to fill.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; names the folder.
+
+    Examples
+    --------
+    >>> with whole_folder("results") as folder:
+    ...     size = Path(folder, "note.txt").write_text("done")
+    >>> Path("results/note.txt").read_text()
+    'done'
+    """
+    place = Path(path).absolute()
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=place.parent, prefix=f".{place.name}.") as holder:
+        # The temporary folder itself can be entered by its owner alone.
+        complete = Path(holder) / "made"
+        complete.mkdir()
+        yield complete
+        previous = Path(holder) / "previous"
+        if place.exists():
+            place.replace(previous)
+        try:
+            complete.replace(place)
+        except BaseException:
+            if previous.exists():
+                previous.replace(place)
+            raise
 
 
 def _open_stream(path: Path) -> BinaryIO:

@@ -6,7 +6,6 @@ a vertex v of link i in assembly coordinates is (T_i^0)^-1 v in frame i (Cao 201
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -31,6 +30,7 @@ from dhkit.description import (
     write_robot,
 )
 from dhkit.description.assets import inside
+from dhkit.description.files import whole_folder
 from dhkit.description.poses import inverse_pose
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DescriptionError, ModelError
@@ -101,23 +101,8 @@ class CadImport:
                 raise ModelError(
                     f"{folder} has files that an import does not make; expected a new folder"
                 )
-            folder.absolute().parent.mkdir(parents=True, exist_ok=True)
-            # Written under another name and renamed: a folder of this name is complete.
-            with tempfile.TemporaryDirectory(
-                dir=folder.absolute().parent, prefix=f".{folder.name}."
-            ) as holder:
-                complete = Path(holder) / "made"
-                complete.mkdir()
+            with whole_folder(folder) as complete:
                 names = self._write_files(complete)
-                previous = Path(holder) / "previous"
-                if folder.exists():
-                    folder.replace(previous)
-                try:
-                    complete.replace(folder)
-                except BaseException:
-                    if previous.exists():
-                        previous.replace(folder)
-                    raise
         return tuple(folder / name for name in names)
 
     def __repr__(self) -> str:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-import shutil
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,7 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from dhkit import __version__
 from dhkit.description import Description
-from dhkit.description.files import read_bounded, write_atomically
+from dhkit.description.files import read_bounded, whole_folder, write_atomically
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sheet import quantity_names, read_task
 from dhkit.grading.answers.sheet_values import AnswerSheet
@@ -73,20 +71,12 @@ class Package:
             raise AnswerError(
                 f"{output}: exists; expected the name of a new folder, or of a zip file"
             )
-        output.parent.mkdir(parents=True, exist_ok=True)
-        # Renamed when it is complete, so that nobody uploads half of it.
-        temporary = Path(tempfile.mkdtemp(prefix=f".{output.name}-", dir=output.parent))
-        try:
-            temporary.chmod(_PROGRAM_MODE)
+        with whole_folder(output) as folder:
             for name, content in self.files.items():
-                path = temporary / name
+                path = folder / name
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
                 path.chmod(_PROGRAM_MODE if name in self.programs else _FILE_MODE)
-            temporary.rename(output)
-        except BaseException:
-            shutil.rmtree(temporary, ignore_errors=True)
-            raise
 
 
 @dataclass(frozen=True)
@@ -157,11 +147,10 @@ class Task:
     @property
     def digest(self) -> str:
         """SHA-256 of the task's name, file and robot, hexadecimal: two tasks have two."""
-        parts = (
-            self.name.encode(),
-            *(x for pair in sorted(self.files.items()) for x in (pair[0].encode(), pair[1])),
-        )
-        return hashlib.sha256(b"\0".join(parts) + self.description.digest.encode()).hexdigest()
+        parts = [self.name.encode(), self.description.digest.encode()]
+        for name, content in sorted(self.files.items()):
+            parts += [name.encode(), content]
+        return hashlib.sha256(b"\0".join(parts)).hexdigest()
 
     @property
     def asked(self) -> tuple[str, ...]:

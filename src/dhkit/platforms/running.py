@@ -29,8 +29,10 @@ from dhkit.platforms.contents import Task
 
 _SECONDS = 60.0
 """Processor time for judging a submission, s."""
+_METADATA = "submission_metadata.json"
+"""Gradescope's file about a submission, in its own folder."""
 _METADATA_BYTES = 1_000_000
-"""Largest file of a submission's metadata, bytes."""
+"""Largest such file, bytes."""
 USAGE = "expected: python -m dhkit.platforms.running gradescope|prairielearn FOLDER"
 
 
@@ -40,24 +42,15 @@ class Layout:
 
     task: str
     submission: str
-    metadata: str
     results: str
     result: Callable[[GradeReport, Marks], Mapping[str, object]]
 
 
 LAYOUTS = {
     # Source: Gradescope, Autograder Specifications.
-    "gradescope": Layout(
-        "source/task.toml",
-        "submission",
-        "submission_metadata.json",
-        "results/results.json",
-        gradescope,
-    ),
+    "gradescope": Layout("source/task.toml", "submission", "results/results.json", gradescope),
     # Source: PrairieLearn, External Grading.
-    "prairielearn": Layout(
-        "tests/task.toml", "student", "data/data.json", "results/results.json", prairielearn
-    ),
+    "prairielearn": Layout("tests/task.toml", "student", "results/results.json", prairielearn),
 }
 
 
@@ -96,7 +89,7 @@ def _task(root: Path, layout: Layout) -> Task:
     if not key_folder.is_dir():
         return Task.read(root / layout.task)
     key = VariantKey.read(key_folder)
-    ids = list(_submitters(root / layout.metadata))
+    ids = list(_submitters(root / _METADATA))
     student = next((one for one in ids if one in key), None)
     if student is None:
         raise AnswerError(
@@ -112,12 +105,15 @@ def _submitters(path: Path) -> Iterator[str]:
     except (ValueError, KeyError, TypeError, RecursionError, DescriptionError):
         return
     for user in users if isinstance(users, list) else ():
-        known = (
-            [user.get(key) for key in ("sid", "email", "name")] if isinstance(user, dict) else []
-        )
-        texts = [one for one in known if isinstance(one, str) and one]
-        yield from texts
-        yield from (one.partition("@")[0] for one in texts if "@" in one)
+        if not isinstance(user, dict):
+            continue
+        for key in ("sid", "email", "name"):
+            text = user.get(key)
+            if not isinstance(text, str) or not text:
+                continue
+            yield text
+            if "@" in text:
+                yield text.partition("@")[0]
 
 
 def _judged(folder: Path, task: Task) -> GradeReport:
