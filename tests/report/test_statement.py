@@ -8,7 +8,7 @@ from dhkit.description import library_robot, with_parameters, with_tool
 from dhkit.description.poses import pose
 from dhkit.grading.answers.sheet import sheet_of
 from dhkit.report.document import html_text, typst_text
-from dhkit.report.statement import statement
+from dhkit.report.statement import arm_html, statement
 
 ARM = library_robot("planar2r")
 
@@ -63,3 +63,10 @@ def test_numbers_and_the_tool_are_those_of_the_arm():
 
 def test_the_name_of_a_student_is_shown_as_it_is():
     assert "<b>" not in page(student="<b>x</b>")
+
+
+def test_rotors_are_printed_where_equations_of_motion_are_asked_for():
+    puma = library_robot("puma560")
+    assert "Drives: inertia of the rotor" in arm_html(puma, ["M"])
+    assert "Drives" not in arm_html(puma, ["T"])
+    assert "Drives" not in arm_html(library_robot("planar2r"), ["M"])

@@ -13,17 +13,26 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.sheet_values import AnswerSheet, Requirements
 from dhkit.grading.grade_report import entry_name
 from dhkit.platforms.contents import Package, Task
-from dhkit.report.statement import task_html
+from dhkit.report.statement import arm_html
 
 if TYPE_CHECKING:
     from dhkit.arm import Arm
 
 ASKED = ("T", "J", "M", "g", "h", "tau", "K")
 """Quantities that have one value at a state; C and V depend on a choice, and tables are no numbers."""
-NO_ANSWERS = AnswerSheet()
+_BODIES_ALONE = "Rotors of drives and friction are left out."
+_MEANINGS = {
+    "T": "T is the pose of the tool in the world: 4 rows of 4, lengths in m.",
+    "J": "J is the Jacobian of the tool, 6 rows: velocity of its origin, then angular velocity, in world axes.",
+    "M": f"M is the mass matrix. {_BODIES_ALONE}",
+    "g": "g are the joint torques (forces of slides) that hold the arm against gravity.",
+    "h": f"h = C qd are the Coriolis and centrifugal torques (forces of slides). {_BODIES_ALONE}",
+    "tau": f"tau = M qdd + h + g are the joint torques (forces of slides). {_BODIES_ALONE}",
+    "K": f"K is the kinetic energy. {_BODIES_ALONE}",
+}
+"""Definitions of what is asked."""
 TOLERANCE = 1e-3
 """Relative error up to which a number is right: answers have four significant digits."""
 _SMALLEST = 1e-2
@@ -190,7 +199,7 @@ def _text(
         )
         lines.append(f"<p>{numbers}</p>")
     asked = f"{entry}, in {unit}" if unit else entry
-    about = task_html(description, replace(NO_ANSWERS, task=Requirements(asked=(quantity,))))
+    about = f"{arm_html(description, [quantity])}<p>{html.escape(_MEANINGS[quantity])}</p>"
     return (
         f"{about}<p>What is {html.escape(asked)}, at this state?</p>{''.join(lines)}"
         "<p>Give at least four significant digits.</p>"

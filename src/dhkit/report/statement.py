@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from dhkit.description import Body, Convention, Description, Placement
 from dhkit.grading.answers.sheet import JACOBIAN_ROWS
-from dhkit.grading.answers.sheet_values import AnswerSheet
+from dhkit.grading.answers.sheet_values import AnswerSheet, Requirements
 from dhkit.grading.judging.truth import DYNAMICS
 from dhkit.grading.schema import MEANINGS
 from dhkit.report.document import (
@@ -96,6 +96,21 @@ def task_html(description: Description, task: AnswerSheet) -> str:
     return html_blocks([*_asked(task), *_numbers(description, task)])
 
 
+def arm_html(description: Description, quantities: Sequence[str]) -> str:
+    """Return the arm in numbers as HTML: with bodies where one of these quantities needs them.
+
+    Parameters
+    ----------
+    description
+        The arm.
+    quantities
+        Names such as ``"T"`` and ``"M"``.
+    """
+    return html_blocks(
+        list(_numbers(description, AnswerSheet(task=Requirements(asked=tuple(quantities)))))
+    )
+
+
 def _asked(task: AnswerSheet) -> Iterator[Block]:
     required = task.task
     if required.asked:
@@ -167,6 +182,20 @@ def _numbers(description: Description, task: AnswerSheet) -> Iterator[Block]:
             "that frame (kg m²); moments that are not listed are 0",
             "llll",
         )
+        rotors = [
+            (joint.name, joint.drive.armature.text)
+            for joint in description.joints
+            if joint.drive is not None and not joint.drive.armature.is_zero
+        ]
+        if rotors:
+            yield Table(
+                ("joint", "rotor"),
+                tuple(rotors),
+                "Drives: inertia of the rotor at the joint, gear² J (kg m², kg of a slide)",
+                "lr",
+            )
+        if description.couplings:
+            yield Paragraph("Some rotors turn with two joints: the robot file says which.")
         gravity = ", ".join(entry.text for entry in description.gravity)
         yield Paragraph(f"Free fall in the world frame: ({gravity}) m/s².")
 

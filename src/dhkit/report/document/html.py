@@ -49,6 +49,9 @@ pre { font: .72rem/1.35 "DejaVu Sans Mono", monospace; overflow-x: auto; backgro
 """
 
 
+_TABLE_STYLE = "margin: 0.8em 0; border-collapse: collapse; text-align: left"
+
+
 def html_text(document: Document) -> str:
     """Return a document as a page of HTML.
 
@@ -67,7 +70,7 @@ def html_text(document: Document) -> str:
 
 
 def html_blocks(blocks: Sequence[Block]) -> str:
-    """Return blocks as HTML for a page of somebody else, without headings of its own and without styles.
+    """Return blocks as HTML for a page of somebody else, which has no style sheet for them: tables bring their spacing.
 
     Examples
     --------
@@ -75,7 +78,8 @@ def html_blocks(blocks: Sequence[Block]) -> str:
     '<p>a &lt; b</p>'
     """
     numbers = _Numbers()
-    return "\n".join(line for block in blocks for line in _block(block, numbers))
+    text = "\n".join(line for block in blocks for line in _block(block, numbers))
+    return text.replace("<table ", f'<table cellpadding="4" style="{_TABLE_STYLE}" ')
 
 
 class _Numbers:
