@@ -228,3 +228,15 @@ def test_rows_get_the_ids_of_a_list_of_students(tmp_path, table, ids):
         named, unknown = with_ids(found.sheets, read_students(tmp_path / "students.csv"))
     assert {sheet.student for sheet in named} == ids
     assert set(unknown) == {student for student in ids if "@" not in student}
+
+
+def test_nested_aliases_of_yaml_are_no_names(tmp_path):
+    folder = tmp_path / "export"
+    (folder / "submission_1").mkdir(parents=True)
+    (folder / "submission_1" / "answer.py").write_text("g1 = 0")
+    (folder / "submission_metadata.yml").write_text(
+        "submission_1:\n  :submitters:\n  - :sid: &a0 x\n"
+        + "".join(f"  - :name: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]\n" for k in range(1, 12))
+    )
+    with pytest.raises(AnswerError, match="a submitter without name"), opened_submissions([folder]):
+        pass

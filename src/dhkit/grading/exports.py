@@ -393,10 +393,11 @@ def _submitters(file: Path, path: Path) -> dict[str, list[_Submitter]]:
 
 
 def _submitter(data: object, time: datetime | None, place: str) -> _Submitter:
-    texts = [
-        data.get(key) if isinstance(data, dict) else None for key in (":sid", ":email", ":name")
-    ]
-    names = tuple(str(text).strip() for text in texts if text is not None and str(text).strip())
+    fields = data if isinstance(data, dict) else {}
+    # Numbers and text alone: what YAML's aliases can nest would be endless as text.
+    values = [fields.get(key) for key in (":sid", ":email", ":name")]
+    texts = [str(value).strip() for value in values if isinstance(value, str | int)]
+    names = tuple(text for text in texts if text)
     if not names:
         raise AnswerError(f"{place}: a submitter without name, email and sid")
     return _Submitter(names[0], names[1:], time)
