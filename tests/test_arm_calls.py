@@ -426,8 +426,8 @@ def test_a_forked_process_compiles_for_itself(tmp_path):
         "for _ in range(300): arm.fk(q); arm.mass_matrix(q)\n"
         "for t in threading.enumerate():\n"
         "    if t is not threading.current_thread(): t.join()\n"
-        "print(type(arm._calls.mass_matrix).__name__, flush=True)\n"
-        "if pid: assert os.waitpid(pid, 0)[1] == 0\n",
+        "if pid: assert os.waitpid(pid, 0)[1] == 0\n"  # the child prints first: two prints at once mix their lines
+        "print(type(arm._calls.mass_matrix).__name__, flush=True)\n",
         DHKIT_CACHE_DIR=str(tmp_path),
     )
     assert (done.returncode, done.stderr) == (0, "")
