@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +17,30 @@ import dhkit
 from acceptance import in_time, only_accepting
 from dhkit import Arm, scale
 from dhkit.cli import main
-from dhkit.errors import DescriptionError, DhkitError, MissingPackageError, PlanningError
+from dhkit.errors import (
+    AnswerError,
+    DescriptionError,
+    DhkitError,
+    MissingPackageError,
+    PlanningError,
+)
+from dhkit.grading import judge_process
+from dhkit.grading.batch import grade_all
+from dhkit.grading.class_judge import ClassJudge
+from dhkit.grading.judge_process import JudgeTask, judged_elsewhere
+from dhkit.grading.options import GradeOptions
+from dhkit.grading.reports.json import report_of
+from dhkit.grading.sheets import Sheet, find_sheets
+from dhkit.grading.variants import VariantKey
 from dhkit.kernels import kernel_mode
+from dhkit.scale.clusters import TASKS_AHEAD, completed
 
 da = pytest.importorskip("dask.array")
 pytest.importorskip("distributed")
 zarr = pytest.importorskip("zarr")
 
 GIGABYTE = 1e9
+GIGABYTES = 2 << 30
 SAMPLES = 1_000_000
 ROWS = 3_000
 PLANAR = Arm.load("planar2r")
@@ -96,14 +113,14 @@ class Written:
 def test_a_lost_worker_costs_its_own_tasks_alone(client, tmp_path):
     items = list(range(40))
     found = {}
-    for number, result in scale._completed(client, Written(tmp_path), items):
+    for number, result in completed(client, Written(tmp_path), items):
         found[number] = result
         if len(found) == 10:
             kill_a_worker(client)
     assert found == {item: item**2 for item in items}
     # It worked on one task, one waited, and results of others may not have been fetched.
     calls = len(list(tmp_path.iterdir()))
-    assert len(items) <= calls <= len(items) + scale.TASKS_AHEAD + 1
+    assert len(items) <= calls <= len(items) + TASKS_AHEAD + 1
 
 
 @pytest.mark.slow
@@ -322,17 +339,116 @@ def test_a_task_that_kills_its_workers_is_named():
         scale.connected(cluster.scheduler_address) as client,
         pytest.raises(DhkitError, match="a task ended its worker again and again"),
     ):
-        list(scale._completed(client, os._exit, [1]))
+        list(completed(client, os._exit, [1]))
 
 
 @only_accepting  # closing a cluster without a scheduler takes half a minute
 def test_a_scheduler_that_is_lost_is_named():
     with small_cluster() as cluster, scale.connected(cluster.scheduler_address) as client:
-        results = scale._completed(client, abs, range(10))
+        results = completed(client, abs, range(10))
         next(results)
         cluster.sync(cluster.scheduler.close)
         with pytest.raises(DhkitError, match="the connection to the scheduler is lost"):
             list(results)
+
+
+# Grades
+
+G1 = "g1 = 9.81*((m1/2 + m2)*l1*cos(q1) + m2*l2*cos(q1 + q2)/2)\n"
+RIGHT = G1 + "g2 = 9.81*m2*l2*cos(q1 + q2)/2\n"
+WRONG = G1 + "g2 = 9.81*m2*l2*cos(q2)/2\n"
+
+
+@pytest.fixture
+def sheets(tmp_path):
+    """Return sheets of six students, every second one right, and what is wrong with two more."""
+    for number in range(6):
+        (tmp_path / f"s{number}.py").write_text(WRONG if number % 2 else RIGHT)
+    (tmp_path / "strange.py").write_bytes(b"\xff\xfe g2")
+    (tmp_path / "word.docx").write_text("g2")
+    return find_sheets([tmp_path])
+
+
+JUDGE = ClassJudge(options=GradeOptions(seed=7), robot=PLANAR.description, has_own_seeds=True)
+
+
+def untimed(report):
+    return replace(report, seconds=0.0)
+
+
+def in_processes(sheets, judge=JUDGE):
+    return [untimed(report) for report in grade_all(sheets, judge)]
+
+
+def on_cluster(client, sheets, judge=JUDGE):
+    found = dict(scale.grade_many(client, sheets, judge))
+    return [untimed(found[number]) for number in range(len(sheets))]
+
+
+@pytest.mark.slow
+def test_sheets_are_judged_as_on_one_machine(client, sheets):
+    reports = on_cluster(client, sheets)
+    assert reports == in_processes(sheets)
+    assert [report.verdict.value for report in reports] == [
+        *["correct", "wrong"] * 3,
+        *["unreadable"] * 2,
+    ]
+
+
+@pytest.mark.slow
+def test_a_lost_worker_costs_no_report(client, sheets):
+    many = [replace(sheet, student=str(k)) for k, sheet in enumerate(sheets * 5)]
+    found = {}
+    for number, report in scale.grade_many(client, many, JUDGE):
+        found[number] = untimed(report)
+        if len(found) == 10:
+            kill_a_worker(client)
+    assert [found[number] for number in range(len(many))] == in_processes(many)
+
+
+def task_of(path, judge=JUDGE, seconds=60.0):
+    return JudgeTask.of(Sheet(path), judge, seconds, GIGABYTES)
+
+
+def test_a_process_judges_sheets_of_another_machine(tmp_path):
+    """It needs neither the file nor the key; messages name the file as here; a process that ended is replaced."""
+    path = tmp_path / "ada.py"
+    path.write_text(RIGHT)
+    task = task_of(path)
+    path.unlink()
+    for _ in range(2):
+        report = report_of(judged_elsewhere(task))
+        assert (report.verdict.value, report.sheet) == ("correct", str(path))
+        judge_process._OWN.process().end()
+    path.write_text("g2 = [")
+    report = report_of(judged_elsewhere(task_of(path)))
+    assert report.error.startswith(f"{path}: ")
+
+
+def test_a_process_for_sheets_ends_with_its_program_or_when_it_is_idle():
+    program = "from dhkit.grading import judge_process as p; p.IDLE_SECONDS = 0.1; p.serve()"
+    for stdin in (subprocess.DEVNULL, subprocess.PIPE):
+        with subprocess.Popen([sys.executable, "-c", program], stdin=stdin) as process:
+            assert process.wait(60) == 0
+
+
+def test_a_sheet_on_another_machine_has_limits(tmp_path):
+    path = tmp_path / "ada.py"
+    path.write_text(RIGHT)
+    report = report_of(judged_elsewhere(task_of(path, seconds=0.001)))
+    assert report.error == "took longer than 0.001 s"
+    with path.open("wb") as file:
+        file.truncate(50_000_000)
+    report = report_of(judged_elsewhere(task_of(path)))
+    here = next(grade_all([Sheet(path)], JUDGE))
+    assert report.error == here.error
+
+
+def test_a_student_without_a_variant_is_told_before_anything_is_sent(tmp_path, sheets):
+    key = VariantKey(tmp_path, 1, "", {})
+    judge = replace(JUDGE, key=key, students={sheet.path: "eve" for sheet in sheets})
+    with pytest.raises(AnswerError, match="student 'eve' has no variant"):
+        JudgeTask.of(sheets[0], judge, 60.0, GIGABYTES)
 
 
 # Files and the command

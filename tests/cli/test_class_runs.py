@@ -103,9 +103,15 @@ def test_a_class_is_judged_alike_whether_it_is_killed_or_not(tmp_path, monkeypat
     said = capsys.readouterr().err
     assert f"{taken} of {len(expected)} sheets were judged before, and are taken up" in said
     assert results(stopped) == results(whole)
-    if ACCEPTING:
-        with capsys.disabled():
-            print(f"\n{len(expected)} files judged in {seconds:.0f} s")
+    if not ACCEPTING:
+        return
+    begin = time.monotonic()
+    distributed = tmp_path / "distributed"
+    assert grade(*arguments(distributed, "--scheduler", "local:2")) == 1
+    assert results(distributed) == results(whole)
+    with capsys.disabled():
+        print(f"\n{len(expected)} files judged in {seconds:.0f} s")
+        print(f"on two workers of a cluster in {time.monotonic() - begin:.0f} s")
 
 
 def test_without_times_nothing_is_late_and_stdout_is_json_alone(tmp_path, monkeypatch, capsys):

@@ -12,6 +12,7 @@ import pytest
 
 from dhkit.cli import grade
 from dhkit.cli.grade_output import Delivery
+from dhkit.cli.judging_place import JudgingPlace
 from dhkit.errors import AnswerError
 from dhkit.grading.batch import judgement_key
 from dhkit.grading.exports import Keep, opened_submissions
@@ -23,12 +24,18 @@ from grading.judged import REPORT
 RIGHT = GradeReport("planar2r", "abc123", "0.1.0", (Entry("V", (), Verdict.CORRECT, "m1*g*y"),))
 
 
-def judge(path):
-    """Judge a sheet by what it holds."""
-    text = path.read_text()
-    if text == "broken":
-        raise AnswerError(f"{path}: no TOML: line 1")
-    return RIGHT if text == "right" else replace(REPORT, sheet=None, student="")
+class FakeJudge:
+    """Judges a sheet by what it holds."""
+
+    def __init__(self, rubric=None, prepare=lambda report: None):
+        self.rubric = rubric or Rubric()
+        self.prepare = prepare
+
+    def __call__(self, path):
+        text = path.read_text()
+        if text == "broken":
+            raise AnswerError(f"{path}: no TOML: line 1")
+        return RIGHT if text == "right" else replace(REPORT, sheet=None, student="")
 
 
 @pytest.fixture
@@ -51,10 +58,9 @@ def dhkit(capsys):
         with opened_submissions(sheets) as submissions:
             status = grade.run(
                 submissions,
-                judge,
-                rubric or Rubric(),
+                FakeJudge(rubric),
                 Delivery(**delivery),
-                jobs=jobs,
+                place=JudgingPlace(jobs),
                 seconds=seconds,
             )
         return status, *capsys.readouterr()
@@ -233,9 +239,9 @@ def test_marking_again_needs_reports(tmp_path):
 def test_names_of_files_come_from_nobody(dhkit, tmp_path, monkeypatch):
     """Students whose names are paths, hidden, long or alike get files of their own, in the folder."""
     monkeypatch.setattr(
-        sys.modules[__name__],
-        "judge",
-        lambda path: replace(RIGHT, student=path.read_text(encoding="utf-8")),
+        FakeJudge,
+        "__call__",
+        lambda self, path: replace(RIGHT, student=path.read_text(encoding="utf-8")),
     )
     names = ["../../up", "..", "", "Ada", "ada", "x" * 300, "a/b\n", "Zoë", "con\x1b[31m"]
     for k, name in enumerate(names):
@@ -374,11 +380,9 @@ def test_a_run_goes_on_where_it_was_stopped(folder, tmp_path, capsys):
         with opened_submissions([folder]) as submissions:
             grade.run(
                 submissions,
-                judge,
-                Rubric(),
+                FakeJudge(prepare=lambda report: asked.append(report.student)),
                 Delivery(output=out),
-                jobs=1,
-                prepare=lambda report: asked.append(report.student),
+                place=JudgingPlace(1),
                 key_of=key_of,
             )
         return list(asked), capsys.readouterr().err
@@ -405,11 +409,9 @@ def test_ctrl_c_says_how_to_go_on(folder, tmp_path, capsys):
     with opened_submissions([folder]) as submissions, pytest.raises(KeyboardInterrupt):
         grade.run(
             submissions,
-            judge,
-            Rubric(),
+            FakeJudge(prepare=stop),
             Delivery(output=tmp_path / "out"),
-            jobs=1,
-            prepare=stop,
+            place=JudgingPlace(1),
             key_of=lambda sheet: judgement_key(sheet, []),
         )
     assert capsys.readouterr().err == (

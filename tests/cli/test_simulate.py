@@ -131,14 +131,14 @@ def test_motions_come_from_files_of_dhkit_and_from_elsewhere(dhkit, tmp_path):
     rows = np.column_stack([times, np.degrees(motion.q(times))])
     lines = ["time,shoulder,elbow", *(",".join(map(str, row)) for row in rows.tolist())]
     (tmp_path / "theirs.csv").write_text("\n".join(lines) + "\n")
-    savemat(tmp_path / "simulink.mat", {"tout": times, "yout": motion.q(times)})
+    savemat(tmp_path / "simulink.mat", {"tout": times, "angles": motion.q(times)})
     status, out, err = dhkit(
         "simulate",
         "planar2r",
         "--motion",
         tmp_path / "simulink.mat",
         "--columns",
-        "q=yout",
+        "q=angles",
         "--json",
     )
     assert status == 0 and json.loads(out)["duration_s"] == pytest.approx(1.0), err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -18,27 +17,25 @@ from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_folder import MAX_LISTED, Records, file_names
 from dhkit.cli.grade_output import Delivery
 from dhkit.cli.isolating import Isolated, isolation_for
+from dhkit.cli.judging_place import HERE, JudgingPlace
 from dhkit.cli.options import Json, read_arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.streams import styled
-from dhkit.description import Description, write_atomically
+from dhkit.description import write_atomically
 from dhkit.display import counted, plain
 from dhkit.errors import AnswerError, DescriptionError
-from dhkit.grading import LIBRARY, grade as judge_sheet
+from dhkit.grading import LIBRARY
 from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.archives import is_archive, unpacked
 from dhkit.grading.batch import (
-    GIGABYTE,
-    Judge,
     content_digest,
-    grade_all,
     judgement_key,
     origin_of_sheet,
-    seed_of_sheet,
 )
+from dhkit.grading.class_judge import ClassJudge
 from dhkit.grading.empty_sheet import template as empty_sheet
-from dhkit.grading.entry_points import prepare, robot_of
+from dhkit.grading.entry_points import robot_of
 from dhkit.grading.explanation import explanation_html, explanation_text
 from dhkit.grading.exports import (
     ExportKind,
@@ -107,6 +104,13 @@ def grade(
         int | None,
         typer.Option(min=1, max=1024, help="Number of processes; default: one for each core."),
     ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Scheduler of dask whose workers judge: tcp://HOST:PORT; local, or local:4 for four processes here.",
+        ),
+    ] = None,
     seconds: Annotated[
         float,
         typer.Option(
@@ -169,6 +173,10 @@ def grade(
         key = VariantKey.read(task)
         task = key.task
     delivery = Delivery("json" if json else form, feedback, output, read, keep)
+    if scheduler is not None and jobs is not None:
+        raise DescriptionError(
+            "--jobs and --scheduler: the scheduler knows its workers; expected one of them"
+        )
     if remark:
         files = ("remark", "sheets", "task", "rubric", "output")
         _require_used(context, "--remark", (*files, "form", "json", "feedback", "read", "keep"))
@@ -182,7 +190,7 @@ def grade(
         delivery,
         execute=execute,
         isolated=isolated,
-        jobs=jobs,
+        place=JudgingPlace(jobs, scheduler),
         seconds=seconds,
         key=key,
         export=export,
@@ -343,7 +351,7 @@ def grade_files(
     *,
     execute: bool = False,
     isolated: bool = False,
-    jobs: int | None = None,
+    place: JudgingPlace = HERE,
     seconds: float = 60.0,
     key: VariantKey | None = None,
     export: ExportKind | None = None,
@@ -367,7 +375,7 @@ def grade_files(
         Whether programs are executed: those of several sheets, which are other people's, only isolated.
     isolated
         Whether a single program too is executed only where it can be isolated.
-    delivery, jobs, seconds
+    delivery, place, seconds
         As in :func:`run`.
     key
         Key of the task's variants, which has a robot for each student.
@@ -420,53 +428,38 @@ def grade_files(
         if delivery.keep is Keep.LAST:
             submissions = replace(submissions, sheets=tuple(last_attempts(submissions.sheets)))
         are_several = submissions.are_several
-        if are_several:
-            prepare(about)
         isolation = None
-        if execute:
+        if execute and place.scheduler is None:
             packages = read.task.packages if read is not None else ()
             name = sheets[0].name if not are_several else "the sheets' programs"
             hidden = [*own_files, *sheets, *submissions.folders]
             isolation = isolation_for(name, isolated or are_several, hidden, packages)
-        options = GradeOptions(
-            task=read, seed=seed, execute=isolation is not None, isolation=isolation
+        judge = ClassJudge(
+            chosen,
+            GradeOptions(task=read, seed=seed, execute=execute, isolation=isolation),
+            about,
+            has_own_seeds=are_several,
+            key=key,
+            students={} if key is None else _students(submissions.sheets, key),
         )
-        whose = {} if key is None else _students(submissions.sheets, key)
-
-        def subject_of(path: Path) -> Description | None:
-            return about if key is None else key.robot_of(whose[path])
-
-        def judge(path: Path) -> GradeReport:
-            own = options
-            if seed is not None and are_several:
-                own = replace(options, seed=seed_of_sheet(seed, path))
-            return judge_sheet(path, subject_of(path), chosen, options=own)
-
         rules = [
             package_version(),
             content_digest(task) if task is not None else "",
             f"digits {chosen.digits}",
             "from the system's entropy" if seed is None else f"seed {seed}",
-            f"executed {isolation}" if execute else "read as text",
+            f"executed {isolation or 'isolated'}" if execute else "read as text",
         ]
 
         def key_of(sheet: Sheet) -> str:
             try:
-                subject = subject_of(sheet.path)
+                subject = judge.robot_of(sheet.path)
             except AnswerError:
                 return ""
             return judgement_key(sheet, [*rules, subject.digest if subject is not None else ""])
 
-        return run(
-            submissions,
-            judge,
-            chosen,
-            delivery,
-            prepare=lambda report: prepare(about, report),
-            jobs=jobs,
-            seconds=seconds,
-            key_of=key_of,
-        )
+        if are_several and place.scheduler is None:
+            judge.prepare()
+        return run(submissions, judge, delivery, place=place, seconds=seconds, key_of=key_of)
 
 
 def _late_notes(sheets: Sequence[Sheet], rubric: Rubric) -> Iterator[str]:
@@ -516,14 +509,11 @@ def _rubric_from(data: Mapping[str, Any], path: Path | None) -> Rubric:
 
 def run(
     submissions: Submissions,
-    judge: Judge,
-    rubric: Rubric,
+    judge: ClassJudge,
     delivery: Delivery = PRINTED,
     *,
-    jobs: int | None = None,
+    place: JudgingPlace = HERE,
     seconds: float = 60.0,
-    memory: int = 2 * GIGABYTE,
-    prepare: Callable[[GradeReport], object] | None = None,
     key_of: Callable[[Sheet], str] = lambda sheet: "",
 ) -> ExitStatus:
     """Judge sheets and deliver the reports; the status is NO if one is wrong, UNUSABLE if one is unreadable.
@@ -535,14 +525,14 @@ def run(
     ----------
     submissions
         The sheets.
-    judge, prepare, seconds, memory
-        As in :func:`~dhkit.grading.batch.grade_all`.
-    jobs
-        Number of processes at a time; by default one for each core.
-    rubric
-        The rubric of all sheets.
+    judge
+        Judge of the sheets, with their rubric.
     delivery
         Form and place of the reports.
+    place
+        Where the sheets are judged.
+    seconds
+        Processor time for each sheet, s; on the clock a sheet may take four times as long.
     key_of
         Function from a sheet to the key of its judgement; empty for one that is always judged.
 
@@ -550,6 +540,8 @@ def run(
     ------
     AnswerError
         There is no such format or feedback, or the output would overwrite a sheet.
+    DhkitError
+        No scheduler answers, or its workers cannot judge.
     """
     sheets = submissions.sheets
     several = submissions.are_several
@@ -568,21 +560,11 @@ def run(
     def complete(report: GradeReport) -> None:
         if records is not None:
             records.write(report)
-        if prepare is not None:
-            prepare(report)
 
     judged: list[GradeReport] = []
     try:
         with _progress(len(waiting)) as progress:
-            judged += grade_all(
-                waiting,
-                judge,
-                jobs=jobs or os.cpu_count() or 1,
-                seconds=seconds,
-                memory=memory,
-                prepare=complete,
-                progress=progress,
-            )
+            judged += place.reports(waiting, judge, seconds, complete, progress)
     except KeyboardInterrupt:
         if records is not None:
             sys.stderr.write(f"dhkit: stopped; the same command goes on with {delivery.output}\n")
@@ -592,7 +574,7 @@ def run(
     for sheet in sheets:
         origin = origin_of_sheet(sheet)
         reports.append(taken[origin] if origin in taken else next(new))
-    delivery(reports, rubric, several, records)
+    delivery(reports, judge.rubric, several, records)
     return _status(reports)
 
 

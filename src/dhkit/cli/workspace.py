@@ -74,7 +74,8 @@ def workspace(
     json: Json = False,
 ) -> None:
     """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
-    from dhkit.scale import check_zarr_place, connected, save_workspace, workspace as sample
+    from dhkit.scale import connected, save_workspace, workspace as sample
+    from dhkit.scale.workspaces import check_zarr_place
     from dhkit.viewer import plot
 
     arm = load_arm(robot)

@@ -27,7 +27,7 @@ GIGABYTE = 1024**3
 
 Judge: TypeAlias = Callable[[Path], GradeReport]
 """Judges a sheet; an exception that it raises becomes the report's error."""
-_Numbered: TypeAlias = tuple[int, GradeReport]
+NumberedReport: TypeAlias = tuple[int, GradeReport]
 """A report with the number of its sheet, from 0."""
 
 
@@ -80,7 +80,7 @@ def grade_all(
         results = _judge_in_processes(sheets, judge, jobs, limits)
     else:
         results = _judge_here(sheets, judge, limits)
-    return _in_order(results, len(sheets), prepare, progress)
+    return in_order(results, len(sheets), prepare, progress)
 
 
 def origin_of_sheet(sheet: Sheet) -> tuple[str, str]:
@@ -151,12 +151,23 @@ def judgement_key(sheet: Sheet, rules: Sequence[str]) -> str:
     return hashlib.sha256(jsons.dumps(parts).encode()).hexdigest()
 
 
-def _in_order(
-    results: Iterator[_Numbered],
+def in_order(
+    results: Iterator[NumberedReport],
     total: int,
-    prepare: Callable[[GradeReport], object] | None,
-    progress: Callable[[int, int], object] | None,
+    prepare: Callable[[GradeReport], object] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Iterator[GradeReport]:
+    """Yield reports in the order of their numbers from 0.
+
+    Parameters
+    ----------
+    results
+        The reports, in any order.
+    total
+        How many there will be.
+    prepare, progress
+        As in :func:`grade_all`.
+    """
     early: dict[int, GradeReport] = {}
     turn = 0
     for done, (number, report) in enumerate(results, start=1):
@@ -170,7 +181,9 @@ def _in_order(
             turn += 1
 
 
-def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: WorkerLimits) -> Iterator[_Numbered]:
+def _judge_here(
+    sheets: Sequence[Sheet], judge: Judge, limits: WorkerLimits
+) -> Iterator[NumberedReport]:
     for number, sheet in enumerate(sheets):
         begin = time.monotonic()
         report = (
@@ -178,12 +191,12 @@ def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: WorkerLimits) -> 
             if sheet.error
             else report_of(_judge_to_json(sheet, judge, limits))
         )
-        yield number, _with_origin(report, sheet, time.monotonic() - begin)
+        yield number, with_origin(report, sheet, time.monotonic() - begin)
 
 
 def _judge_in_processes(
     sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: WorkerLimits
-) -> Iterator[_Numbered]:
+) -> Iterator[NumberedReport]:
     """Yield reports as they are completed; at the end no process is left."""
     waiting = deque(enumerate(sheets))
     with closing(_Pool(judge, limits)) as pool:
@@ -192,7 +205,7 @@ def _judge_in_processes(
                 number, sheet = waiting.popleft()
                 error = sheet.error or pool.start(number, sheet)
                 if error:
-                    yield number, _with_origin(GradeReport(error=error), sheet, 0.0)
+                    yield number, with_origin(GradeReport(error=error), sheet, 0.0)
             yield from pool.wait()
 
 
@@ -256,7 +269,7 @@ class _Pool:
         self._selector.register(worker.pipe, selectors.EVENT_READ, number)
         return ""
 
-    def wait(self) -> list[_Numbered]:
+    def wait(self) -> list[NumberedReport]:
         """Wait until a process writes or exceeds its limit; return the reports that are then complete."""
         if not self.running:
             return []
@@ -285,11 +298,11 @@ class _Pool:
         ]
         return done + [self._finish(number, self.limits.late) for number in late]
 
-    def _finish(self, number: int, error: str = "") -> _Numbered:
+    def _finish(self, number: int, error: str = "") -> NumberedReport:
         sheet, worker = self.running[number]
         status = self._end(number)
         report = GradeReport(error=error) if error else self._report(worker.received, status)
-        return number, _with_origin(report, sheet, time.monotonic() - worker.begin)
+        return number, with_origin(report, sheet, time.monotonic() - worker.begin)
 
     def _end(self, number: int) -> int:
         _, worker = self.running.pop(number)
@@ -318,7 +331,7 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def _with_origin(report: GradeReport, sheet: Sheet, seconds: float) -> GradeReport:
+def with_origin(report: GradeReport, sheet: Sheet, seconds: float) -> GradeReport:
     """Return a report with the fields that this process knows better than the judge."""
     return replace(
         report,
