@@ -140,8 +140,23 @@ def test_poses_that_are_not_reached_or_none():
     T[4, :3, 3] *= 1.3 / np.linalg.norm(T[4, :3, 3])
     found = arm.ik(T)
     assert found.status.tolist()[:4] == ["ok", "out_of_reach", "not_a_pose", "out_of_reach"]
-    # Just beyond reach, where roots are nearly real: nothing is claimed.
-    assert found.status[4] == "not_found"
+    # Beyond reach with this rotation: its polynomial has no real root, and iteration finds nothing.
+    assert found.status[4] == "out_of_reach"
+    assert not arm.ik_numeric(T[4], limits=False).valid.any()
+
+    # Just beyond reach, where roots are nearly real, nothing is claimed.
+    def moved(length):
+        moved = T[4].copy()
+        moved[:3, 3] *= length / np.linalg.norm(moved[:3, 3])
+        return moved
+
+    inside, beyond = 0.5, 1.3
+    assert arm.ik(moved(inside)).valid.any()
+    for _ in range(50):
+        middle = (inside + beyond) / 2
+        inside, beyond = (middle, beyond) if arm.ik(moved(middle)).valid.any() else (inside, middle)
+    assert arm.ik(moved(beyond)).status == "not_found"
+    assert arm.ik(moved(beyond + 1e-11)).status == "not_found"
     assert np.isnan(found.distance[1:4]).all() and found.distance[0] == 0
     alone = arm.ik(T[1])
     assert alone.q.shape == (1, 6) and np.isnan(alone.q).all() and len(alone) == 1

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import prod
 
-from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER
+from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER
 from dhkit.kernels.scalar_source import run_source
 from dhkit.symbolic import Graph, Loop
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels.elementary import EXACT_RANGE, atan2
-from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER
+from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER
 from dhkit.kernels.stages import Stage, Stages
 from dhkit.symbolic import Graph, Loop
 

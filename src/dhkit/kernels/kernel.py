@@ -218,7 +218,7 @@ class Kernel:
 
     def _source(self, program: Graph | Loop) -> str:
         """Return the text of the kernel that is compiled."""
-        if isinstance(program, Loop):
+        if isinstance(program, Loop) and not program.in_lanes:
             from dhkit.kernels.scalar_source import loop_source
 
             return loop_source(program, self.types)

@@ -1,67 +1,20 @@
-"""A kernel as text of LLVM's intermediate representation: a straight-line program over structure-of-arrays blocks."""
+"""A kernel as text of LLVM's intermediate representation: blocks of items in lanes, as a structure of arrays."""
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, islice
-from typing import TypeAlias
 
-from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
-from dhkit.kernels.vectors import (
-    EXACT,
-    FUSING,
-    WIDTH,
-    Body,
-    Mask,
-    Vector,
-    absolute,
-    floor,
-    select,
-    sqrt,
-)
-from dhkit.symbolic import Graph
+from dhkit.kernels.lowering import SMALL_INTEGER, STORED, loop_values, result_values
+from dhkit.kernels.vectors import EXACT, FUSING, WIDTH, Body, Vector
+from dhkit.symbolic import Graph, Loop
 
 BLOCK = 64
 """Largest number of items of a block: 8 vectors of 8 doubles."""
 _BLOCK_BYTES = 44 * 1024
 """Largest size of a block of more than one vector, so that it fits into a first-level cache of 48 KB."""
-
-FLOAT = "float64"
-"""Type of an output's entries, by NumPy's name."""
-SMALL_INTEGER = "uint8"
-"""Type of the entries of an output of flags, by NumPy's name."""
-STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
-"""LLVM's names of these types."""
-
-_Value: TypeAlias = Vector | Mask
-
-_NUMERIC: Mapping[str, Callable[..., _Value]] = {
-    "add": operator.add,
-    "subtract": operator.sub,
-    "multiply": operator.mul,
-    "divide": operator.truediv,
-    "negate": operator.neg,
-    "absolute": absolute,
-    "floor": floor,
-    "sqrt": sqrt,
-    "atan2": atan2,
-    "minimum": minimum,
-    "maximum": maximum,
-    "less": operator.lt,
-    "less_equal": operator.le,
-    "equal": Vector.equals,
-    "unequal": Vector.differs,
-}
-"""Operations of a program on numbers."""
-_LOGICAL: Mapping[str, Callable[..., Mask]] = {
-    "logical_and": operator.and_,
-    "logical_or": operator.or_,
-    "logical_not": operator.invert,
-}
-"""Operations on truth values."""
 
 
 @dataclass(frozen=True)
@@ -72,13 +25,14 @@ class _Layout:
     matrix, share a row.
     """
 
-    graph: Graph
+    program: Graph | Loop
 
     @cached_property
     def inputs(self) -> list[list[int]]:
         """The row of each entry of each input after the parameters."""
-        rows = iter(range(sum(variable.size for variable in self.graph.inputs[1:])))
-        return [list(islice(rows, variable.size)) for variable in self.graph.inputs[1:]]
+        variables = self.program.inputs[1:]
+        rows = iter(range(sum(variable.size for variable in variables)))
+        return [list(islice(rows, variable.size)) for variable in variables]
 
     @cached_property
     def outputs(self) -> list[list[int]]:
@@ -86,7 +40,8 @@ class _Layout:
         first = sum(map(len, self.inputs))
         rows: dict[tuple[int, int], int] = {}
         outputs = []
-        for k, places in enumerate(self.graph.results):
+        last = self.program.finish if isinstance(self.program, Loop) else self.program
+        for k, places in enumerate(last.results):
             outputs.append([rows.setdefault((k, place), first + len(rows)) for place in places])
         return outputs
 
@@ -98,7 +53,7 @@ class _Layout:
         return max(WIDTH, min(fitting, BLOCK))
 
 
-def llvm_source(graph: Graph, types: Sequence[str]) -> str:
+def llvm_source(program: Graph | Loop, types: Sequence[str]) -> str:
     """Return a module with ``void kernel(double *parameters, void **arrays, double *work, int64 count)``.
 
     ``arrays`` holds the addresses of inputs, then outputs: (count, size) each, row by row. They are transposed block by
@@ -107,23 +62,23 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
 
     Parameters
     ----------
-    graph
+    program
         The program; its first input holds the parameters, which all items share.
     types
         Type of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
     """
     # Programs that decide small integers round every operation as the interpreter does, so that both decide alike.
-    layout = _Layout(graph)
+    layout = _Layout(program)
     body = Body(EXACT if SMALL_INTEGER in types else FUSING)
-    results = _results(graph, layout, body, types)
-    inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
-    outputs = [f"%y{k}" for k in range(len(graph.outputs))]
+    results = _results(program, layout, body, types)
+    inputs = [f"%x{k}" for k in range(len(program.inputs) - 1)]
+    outputs = [f"%y{k}" for k in range(len(program.outputs))]
     lines = [
         *body.declarations(),
         "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
         "entry:",
         *chain.from_iterable(_array(k, name) for k, name in enumerate((*inputs, *outputs))),
-        *chain.from_iterable(map(_broadcast, range(graph.inputs[0].size))),
+        *chain.from_iterable(map(_broadcast, range(program.inputs[0].size))),
         "  %none = icmp sle i64 %count, 0",
         "  br i1 %none, label %end, label %block",
         "block:",
@@ -147,15 +102,17 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         lines += [f"  br label %{f'read{k + 1}' if k + 1 < len(inputs) else 'compute'}"]
     lines += [
         "compute:",
-        f"  %item = phi i64 [0, %read{len(inputs) - 1}_end], [%next_item, %compute]",
+        f"  %item = phi i64 [0, %read{len(inputs) - 1}_end], [%next_item, %computed]",
         *body.lines,
         *results,
+        "  br label %computed",
+        "computed:",
         f"  %next_item = add i64 %item, {WIDTH}",
         "  %computing = icmp slt i64 %next_item, %size",
         "  br i1 %computing, label %compute, label %write0",
     ]
     for k, name in enumerate(outputs):
-        before = f"write{k - 1}_end" if k else "compute"
+        before = f"write{k - 1}_end" if k else "computed"
         kind = STORED[types[k]]
         lines += _copied(
             f"write{k}", before, name, layout.outputs[k], layout.block, kind, reading=False
@@ -173,12 +130,15 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) -> list[str]:
+def _results(program: Graph | Loop, layout: _Layout, body: Body, types: Sequence[str]) -> list[str]:
     """Write the program's operations into ``body`` and return the lines that store its results."""
     states = [_loaded(body, rows, layout.block) for rows in layout.inputs]
-    parameters = [Vector(body, f"%p{k}") for k in range(graph.inputs[0].size)]
+    parameters = [Vector(body, f"%p{k}") for k in range(program.inputs[0].size)]
     results: dict[int, Vector] = {}
-    outputs = result_values(graph, body, [parameters, *states], types)
+    if isinstance(program, Loop):
+        outputs = loop_values(program, body, [parameters, *states], _lanes_with_items(body))
+    else:
+        outputs = result_values(program, body, [parameters, *states], types)
     for rows, entries in zip(layout.outputs, outputs, strict=True):
         results.update(zip(rows, entries, strict=True))
     lines = []
@@ -188,137 +148,18 @@ def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) ->
     return lines
 
 
-def result_values(
-    graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]], types: Sequence[str]
-) -> list[list[Vector]]:
-    """Write a program's operations into ``body`` and return the entries of its outputs.
-
-    Parameters
-    ----------
-    graph, types
-        The program, and the type of each output; see :func:`llvm_source`.
-    body
-        Where the operations are written, and how many items they work on.
-    inputs
-        The entries of each input, the parameters first.
-
-    Returns
-    -------
-    list
-        The entries of each output; of float outputs they are NaN where an entry of an input after the parameters is
-        not finite.
-    """
-    outputs = plain_results(graph, body, inputs)
-    missing: Vector | None = None  # 0, or NaN where an input is not finite
-    for x in chain.from_iterable(inputs[1:]):
-        missing = x - x if missing is None else missing + (x - x)
-    if missing is None:
-        return outputs
-    for k, kind in enumerate(types):
-        if kind == FLOAT:
-            outputs[k] = [entry + missing for entry in outputs[k]]
-    return outputs
-
-
-def plain_results(
-    graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]
-) -> list[list[Vector]]:
-    """Write a program's operations into ``body``, as :func:`result_values`, without its rule for NaN."""
-    values = _node_values(graph, body, inputs)
-    return [_numbers(values, places) for places in graph.results]
-
-
-def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[_Value]:
-    """Return the value of every node."""
-    values: dict[int, _Value] = {}
-    pairs = graph.angle_pairs
-
-    def evaluate(k: int) -> None:
-        node = graph.nodes[k]
-        if node.operation == "constant":
-            values[k] = Vector(body, body.constant(node.value))
-        elif node.operation == "input":
-            variable, entry = node.arguments
-            values[k] = inputs[variable][entry]
-        elif node.operation in ("sin", "cos"):
-            angle = node.arguments[0]
-            values.update(zip(pairs[angle], sincos(_number(values[angle])), strict=True))
-        else:
-            values[k] = _apply(node.operation, [values[j] for j in node.arguments])
-
-    if body.width == 1:
-        # The sines of one item's angles are computed together, an angle in each lane of a vector.
-        first = _before_sines(graph)
-        for k in first:
-            evaluate(k)
-        angles = [angle for angle in pairs if angle in first]
-        results = _sincos_in_lanes(body, [_number(values[angle]) for angle in angles])
-        for angle, both in zip(angles, results, strict=True):
-            values.update(zip(pairs[angle], both, strict=True))
-    for k in range(len(graph.nodes)):
-        if k not in values:
-            evaluate(k)
-    return [values[k] for k in range(len(graph.nodes))]
-
-
-def _before_sines(graph: Graph) -> list[int]:
-    """Return the nodes that no sine or cosine goes into, in order."""
-    found: set[int] = set()
-    for k, node in enumerate(graph.nodes):
-        is_source = node.operation in ("constant", "input")
-        is_sine = node.operation in ("sin", "cos")
-        if is_source or (not is_sine and found.issuperset(node.arguments)):
-            found.add(k)
-    return sorted(found)
-
-
-def _sincos_in_lanes(body: Body, angles: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
-    """Return sine and cosine of single numbers, computed as the lanes of vectors."""
-    results: list[tuple[Vector, Vector]] = []
-    lanes = Body(body.liberties, WIDTH, body.lines)
-    for start in range(0, len(angles), WIDTH):
-        part = angles[start : start + WIDTH]
-        name = "poison"
-        for lane in range(WIDTH):
-            # Lanes that are left over repeat the last angle.
-            angle = part[min(lane, len(part) - 1)]
-            insert = f"insertelement {lanes.number_type} {name}, double {angle.name}, i64 {lane}"
-            name = body.define(insert)
-        sine, cosine = sincos(Vector(lanes, name))
-
-        def entry(of: Vector, lane: int) -> Vector:
-            extract = f"extractelement {lanes.number_type} {of.name}, i64 {lane}"
-            return Vector(body, body.define(extract))
-
-        results += [(entry(sine, lane), entry(cosine, lane)) for lane in range(len(part))]
-    return results
-
-
-def _apply(operation: str, arguments: Sequence[_Value]) -> _Value:
-    if operation == "select":
-        condition, true, false = arguments
-        return select(_mask(condition), _number(true), _number(false))
-    if operation in _LOGICAL:
-        return _LOGICAL[operation](*map(_mask, arguments))
-    return _NUMERIC[operation](*map(_number, arguments))
-
-
-def _number(value: _Value) -> Vector:
-    """Return a value as numbers: 1 for true, 0 for false."""
-    return (
-        value
-        if isinstance(value, Vector)
-        else select(value, Vector(value.body, value.body.constant(1.0)), 0.0)
-    )
-
-
-def _numbers(values: Sequence[_Value], places: Sequence[int]) -> list[Vector]:
-    return [_number(values[place]) for place in places]
-
-
-def _mask(value: _Value) -> Mask:
-    """Return a value as truth values: numbers other than 0 are true."""
-    return value if isinstance(value, Mask) else value.differs(0.0)
+def _lanes_with_items(body: Body) -> str:
+    """Return the name of the truth values that tell which lanes have an item: the last vector may be partly filled."""
+    numbers = f"<{WIDTH} x i64>"
+    filled = []
+    for name in ("%item", "%size"):
+        lane = body.define(f"insertelement {numbers} poison, i64 {name}, i64 0")
+        shuffle = f"shufflevector {numbers} {lane}, {numbers} poison, <{WIDTH} x i32>"
+        filled.append(body.define(f"{shuffle} zeroinitializer"))
+    first, end = filled
+    lanes = ", ".join(f"i64 {lane}" for lane in range(WIDTH))
+    item = body.define(f"add {numbers} {first}, <{lanes}>")
+    return body.define(f"icmp slt {numbers} {item}, {end}")
 
 
 def _broadcast(k: int) -> Iterator[str]:

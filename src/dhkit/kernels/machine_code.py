@@ -18,6 +18,8 @@ from dhkit.kernels.stages import Stage, Stages, address, aligned
 
 _OPTIMIZATION = 2
 """LLVM's level for instruction selection and scheduling; for straight-line code no other passes are useful."""
+_STAGED_ITEMS = 32
+"""Largest number of items that are copied into arrays of their own."""
 _ALIGNMENT = 64
 """Alignment of a block's rows, bytes."""
 _SIGNATURE = ctypes.CFUNCTYPE(
@@ -91,20 +93,20 @@ class CompiledFunction:
     def __init__(self, code: bytes) -> None:
         self._engine, place = _loaded(code, "kernel")
         self._function = _SIGNATURE(place)
-        self._single_item: Stages | None = None
-        """Arrays for single items, made at the first one."""
+        self._few_items: Stages | None = None
+        """Arrays for few items, made at the first call."""
 
     def __call__(
         self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
     ) -> None:
         """Fill ``outputs``; all are arrays (N, size), C-contiguous."""
         items = len(inputs[0])
-        if items == 1:
-            # Looking up addresses and allocating the work array takes longer than one item: it is copied into arrays
-            # whose addresses are already known (a stage), and its results are copied out.
-            if self._single_item is None:
-                self._single_item = self._stages(parameters, inputs, outputs)
-            self._single_item.work(1, parameters, inputs, outputs)
+        if 0 < items <= _STAGED_ITEMS:
+            # Looking up addresses and allocating the work array takes longer than a few items: they are copied into
+            # arrays whose addresses are already known (a stage), and their results are copied out.
+            if self._few_items is None:
+                self._few_items = self._stages(parameters, inputs, outputs)
+            self._few_items.work(items, parameters, inputs, outputs)
             return
         for array in (*inputs, *outputs):
             # The machine code does not check its pointers.

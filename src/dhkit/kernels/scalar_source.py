@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 
-from dhkit.kernels.llvm_source import FLOAT, SMALL_INTEGER, STORED, plain_results, result_values
+from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER, STORED, loop_values, result_values
 from dhkit.kernels.vectors import EXACT, FUSING, Body, Vector
 from dhkit.symbolic import Graph, Loop
 
@@ -37,7 +37,7 @@ def run_source(
         for name, variable in zip(_input_names(program), program.inputs, strict=True)
     ]
     if isinstance(program, Loop):
-        outputs = _loop_values(program, body, inputs)
+        outputs = loop_values(program, body, inputs)
     else:
         outputs = result_values(program, body, inputs, types)
 
@@ -106,33 +106,6 @@ def loop_source(loop: Loop, types: Sequence[str]) -> str:
 
 def _input_names(program: Graph | Loop) -> list[str]:
     return ["parameters", *(f"x{k}" for k in range(len(program.inputs) - 1))]
-
-
-def _loop_values(loop: Loop, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[list[Vector]]:
-    """Write a loop into ``body`` and return the entries of its outputs."""
-    # Where an input is not finite, the start is NaN, and all that follows from it.
-    first, fixed = result_values(loop.begin, body, inputs, [FLOAT, FLOAT])
-    body.lines += ["  br label %before", "before:", "  br label %step", "step:"]
-
-    # The state's values and the number of steps come from the start, and then from the step before, whose values are
-    # known only after the step is written.
-    state = [Vector(body, f"%state{k}") for k in range(len(first))]
-    place = len(body.lines)
-    body.lines.append("")
-    after, (goes_on,) = plain_results(loop.step, body, [*inputs, fixed, state])
-    origins = ["  %steps = phi i64 [0, %before], [%steps_after, %step]"]
-    for now, old, new in zip(state, first, after, strict=True):
-        origins.append(f"  {now.name} = phi double [{old.name}, %before], [{new.name}, %step]")
-    body.lines[place] = "\n".join(origins)
-
-    body.lines += [
-        "  %steps_after = add i64 %steps, 1",
-        f"  %has_steps = icmp slt i64 %steps_after, {loop.most}",
-        f"  %goes_on = and i1 {goes_on.differs(0.0).name}, %has_steps",
-        "  br i1 %goes_on, label %step, label %finish",
-        "finish:",
-    ]
-    return plain_results(loop.finish, body, [*inputs, fixed, after])
 
 
 def _loaded(body: Body, pointer: str, size: int) -> list[Vector]:

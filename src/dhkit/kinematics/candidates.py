@@ -144,10 +144,13 @@ def _outside(description: Description, q: Array) -> NDArray[np.bool_]:
     lower = numbers.lower - LIMIT_SLACK
     upper = numbers.upper + LIMIT_SLACK
 
-    # lower <= q + 2 pi k <= upper holds for some whole k if ceil((lower - q) / (2 pi)) <= floor((upper - q) / (2 pi)).
-    with np.errstate(invalid="ignore"):
-        windings = np.floor((upper - q) / math.tau) - np.ceil((lower - q) / math.tau)
-        outside: NDArray[np.bool_] = np.where(
-            numbers.prismatic, (q < lower) | (q > upper), windings < 0
-        )
-    return np.asarray(outside.any(axis=-1))
+    outside = np.zeros(q.shape[:-1], dtype=bool)
+    # Most are inside as they are, without whole turns. Comparisons with NaN are false.
+    rows = np.nonzero(((q < lower) | (q > upper)).any(axis=-1))
+    if len(rows[0]):
+        # lower <= q + 2 pi k <= upper for some whole k: ceil((lower - q) / (2 pi)) <= floor((upper - q) / (2 pi)).
+        some = q[rows]
+        windings = np.floor((upper - some) / math.tau) - np.ceil((lower - some) / math.tau)
+        is_beyond = np.where(numbers.prismatic, (some < lower) | (some > upper), windings < 0)
+        outside[rows] = is_beyond.any(axis=-1)
+    return outside

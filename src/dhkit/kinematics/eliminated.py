@@ -94,9 +94,21 @@ def _singular_flags(
     J = jacobian(description, q[is_asked])
     # Without units: velocities over the reach.
     J[:, :3] /= Axes.of(description).scale
-    smallest = np.linalg.svd(J, compute_uv=False)[:, -1]
-    flags[is_asked] = np.where(smallest < SINGULAR, np.uint8(IKFlag.singular), np.uint8(0))
+    flags[is_asked] = np.where(_are_singular(J), np.uint8(IKFlag.singular), np.uint8(0))
     return flags
+
+
+def _are_singular(J: Array) -> NDArray[np.bool_]:
+    """Return whether the smallest singular value of Jacobians (N, 6, 6) without units is below that of a singularity.
+
+    It is |det J| over the product of the five others, which is at most (|J|_F^2 / 5)^(5/2): where that shows that it is
+    larger, it is not computed.
+    """
+    squares = np.sum(J * J, axis=(1, 2))
+    rows = np.flatnonzero(np.abs(np.linalg.det(J)) < 2 * SINGULAR * (squares / 5) ** 2.5)
+    singular = np.zeros(len(J), dtype=bool)
+    singular[rows] = np.linalg.svd(J[rows], compute_uv=False)[:, -1] < SINGULAR
+    return singular
 
 
 @lru_cache(maxsize=64)
@@ -112,13 +124,25 @@ def has_curves(description: Description) -> bool:
 
 
 def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
-    """Return solutions (K, n) sorted by the poses that they belong to, shape (poses, B, n), filled up with NaN."""
+    """Return solutions (K, n) as a table, shape (poses, B, n), those of a pose sorted, and filled up with NaN.
+
+    Parameters
+    ----------
+    q
+        Solutions, those of a pose together, and poses in ascending order; rad and m.
+    owner
+        The pose of each, shape (K,).
+    poses
+        Number of poses.
+    """
     counts = np.bincount(owner, minlength=poses)
     # Angles are rounded, and those of joints 2 and 3 count where the ones before are equal.
     q_1, q_2, q_3 = np.rint(q[:, :3].T / SAME_ANGLE) * SAME_ANGLE
     by_joints = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
-    order = np.lexsort([by_joints, owner])
     place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
-    table = np.full((poses, max(1, int(counts.max(initial=0))), q.shape[1]), np.nan)
-    table[owner[order], place] = q[order]
-    return table
+    shape = (poses, max(1, int(counts.max(initial=0))))
+    keys = np.full(shape, np.inf)
+    keys[owner, place] = by_joints
+    table = np.full((*shape, q.shape[1]), np.nan)
+    table[owner, place] = q
+    return np.take_along_axis(table, np.argsort(keys, axis=1)[..., None], axis=1)

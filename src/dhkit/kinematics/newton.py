@@ -184,10 +184,16 @@ def descent_kernel(description: Description, size: int) -> tuple[Kernel, Array]:
     return run, parameters
 
 
-def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
-    """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
+def magnitude(error: Array) -> Array:
+    """Return the larger one of position and rotation of errors (..., 6) or (..., 3), shape (...)."""
     squares = error**2
     position = squares[..., :3].sum(axis=-1)
     rotation = squares[..., 3:].sum(axis=-1)
-    within: NDArray[np.bool_] = np.maximum(position, rotation) <= tolerance**2
+    larger: Array = np.sqrt(np.maximum(position, rotation))
+    return larger
+
+
+def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
+    """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
+    within: NDArray[np.bool_] = magnitude(error) <= tolerance
     return within

@@ -14,6 +14,7 @@ polynomial.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -21,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.cached_property import cached_property
-from dhkit.description import Array
+from dhkit.description import Array, Description
 from dhkit.description.poses import inverse_pose
 from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.newton import Newton, magnitude
 
 Complex: TypeAlias = "NDArray[np.complex128]"
 Coefficients: TypeAlias = "tuple[Array, Array, Array]"
@@ -57,19 +59,20 @@ class General:
     """A point of each axis, shape (6, 3), as shares of the reach."""
     T_tool_world: Array
     """The world in the tool at zero joint positions, shape (4, 4), m."""
-    length: float
-    """The reach, m, by which lengths are divided."""
+    newton: Newton
+    """Errors of poses; its length, the reach, divides lengths."""
     joint: int = 3
     """Joint i: 1, 2 or 3."""
     is_reversed: bool = False
     """Whether joints are counted from the tool, so that joint i is joint 7 - i of the robot."""
 
     @classmethod
-    def of(cls, axes: Axes) -> General:
+    def of(cls, description: Description) -> General:
         """Return an arm; see :meth:`variants`."""
-        return cls(
-            axes.directions, axes.points / axes.scale, inverse_pose(axes.T_world_tool), axes.scale
-        )
+        axes = Axes.of(description)
+        newton = Newton.of(description, position_only=False, limits=False)
+        T_tool_world = inverse_pose(axes.T_world_tool)
+        return cls(axes.directions, axes.points / axes.scale, T_tool_world, newton)
 
     def variants(self) -> list[General]:
         """Return the six ways of elimination: for some arms some of them have a polynomial that is always 0."""
@@ -98,7 +101,7 @@ class General:
         # The determinant is real up to a constant factor of absolute value 1.
         return np.asarray((np.stack(values, axis=1) * self._phase).real)
 
-    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array]:
+    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """Return joint values near the solutions at roots of the polynomial.
 
         Parameters
@@ -110,9 +113,11 @@ class General:
 
         Returns
         -------
-        tuple[NDArray[np.intp], Array]
-            Indices of the roots, shape (L,), and joint values, shape (L, 6), rad.
+        tuple[NDArray[np.intp], Array, Array]
+            Indices of the roots, shape (L,), ascending; joint values, shape (L, 6), rad, in (-pi, pi]; and their
+            errors, shares of the reach and rad, shape (L,).
         """
+        goals = poses
         motions = self._motions(poses)
         reduced, other = self._reduced(motions)
         of_root, null = _null_vectors(_matrix(reduced, angles))
@@ -134,7 +139,12 @@ class General:
         # Their order is cos b, sin b, cos a, cos a cos b, cos a sin b, sin a, ...
         a = np.arctan2(products[:, 5, 0], products[:, 2, 0])
         b = np.arctan2(products[:, 1, 0], products[:, 0, 0])
-        return of_root, self._joints(motions, (kept, second, third), (a, b))
+        q = self._joints(motions, (kept, second, third), (a, b))
+        q -= math.tau * np.ceil((q - math.pi) / math.tau)
+        order = np.argsort(of_root, kind="stable")
+        of_root = of_root[order]
+        q = q[order]
+        return of_root, q, magnitude(self.newton.error(q, goals[of_root]))
 
     def _joints(
         self, motions: Array, near: tuple[Array, Array, Array], far: tuple[Array, Array]
@@ -166,14 +176,14 @@ class General:
     def _motions(self, poses: Array) -> Array:
         """Return M, the motions from zero joint positions to poses (N, 16) in the world, shape (N, 4, 4)."""
         M = poses.reshape(-1, 4, 4) @ self.T_tool_world
-        M[:, :3, 3] /= self.length
+        M[:, :3, 3] /= self.newton.length
         return inverse_poses(M) if self.is_reversed else M
 
     @cached_property
     def _phase(self) -> complex:
         """Complex number of absolute value 1 that makes determinants real."""
         T = inverse_pose(self.T_tool_world)
-        T[:3, 3] += 0.1 * self.length
+        T[:3, 3] += 0.1 * self.newton.length
         reduced, _ = self._reduced(self._motions(T.reshape(1, 16)))
         value = np.linalg.det(_matrix(reduced, np.array([0.3])))[0]
         return complex(np.conj(value) / abs(value)) if value else 1.0

@@ -55,7 +55,7 @@ class SixJoints:
             return self.two_parallel
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, 6))
         poses = forward_kinematics(self.description, q).reshape(-1, 16)
-        variants = General.of(Axes.of(self.description)).variants()
+        variants = General.of(self.description).variants()
         failures = [self._failures(variant, q, poses) for variant in variants]
         return variants[int(np.argmin(failures))]
 
@@ -171,9 +171,16 @@ def has_two_parallel(description: Description) -> bool:
 
 def _with(found: Found, rows: NDArray[np.intp], more: Array, owner: NDArray[np.intp]) -> Found:
     """Return solutions with others (K, 6) added; ``owner`` are indices of ``rows``, those of the poses, shape (K,)."""
-    q, owners = distinct(
-        np.concatenate([found.q, more]), np.concatenate([found.owner, rows[owner]])
-    )
     is_delicate = found.is_delicate.copy()
     is_delicate[rows] = True
-    return replace(found, q=q, owner=owners, is_delicate=is_delicate)
+    is_asked = np.zeros(len(found.expected), dtype=bool)
+    is_asked[rows] = True
+    changes = is_asked[found.owner]
+    q, owners = distinct(
+        np.concatenate([found.q[changes], more]),
+        np.concatenate([found.owner[changes], rows[owner]]),
+    )
+    q = np.concatenate([found.q[~changes], q])
+    owners = np.concatenate([found.owner[~changes], owners])
+    order = np.argsort(owners, kind="stable")
+    return replace(found, q=q[order], owner=owners[order], is_delicate=is_delicate)

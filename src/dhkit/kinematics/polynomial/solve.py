@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
-from dhkit.kinematics.newton import Newton, closes
 from dhkit.kinematics.numeric import refined
 from dhkit.kinematics.polynomial import trigonometric
 
@@ -28,8 +26,6 @@ _SPACING = 10.0
 """Distance of the numbers of two poses; those of one pose differ by up to 6."""
 MOST = 16
 """Largest number of solutions of a pose, unless they are infinitely many."""
-_NEAR_ROOTS = 1e-3
-"""Distance of two roots, rad, below which a solution may be singular."""
 
 
 class Elimination(Protocol):
@@ -41,8 +37,11 @@ class Elimination(Protocol):
     def values(self, poses: Array, angles: Array) -> Array:
         """Return values of the polynomial, shape (N, S), at angles (N, S)."""
 
-    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array]:
-        """Return indices of poses and joint values (L, 6) near solutions, for roots (K,) of poses (K, 16)."""
+    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return indices of poses, joint values (L, 6) and errors (L,), for roots (K,) of poses (K, 16).
+
+        Joint values are near solutions, rad, in (-pi, pi]; errors are shares of the reach and rad.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,63 +99,46 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
     with np.errstate(all="ignore"):
         first = elimination.first_angle(poses)
         values = elimination.values(poses, first[:, None] + trigonometric.angles())
-        c, beyond = trigonometric.coefficients(values)
-        roots = trigonometric.real_roots(c, beyond)
+        roots = trigonometric.real_roots(values)
         goals = poses[roots.owner]
-        of_root, starts = elimination.starts(goals, roots.angle + first[roots.owner])
-    is_number = np.isfinite(starts).all(axis=1)
-    of_root = of_root[is_number]
-    q, closed = _polished(description, starts[is_number], goals[of_root])
-    q, owner = distinct(q[closed], roots.owner[of_root[closed]])
+        of_root, q, error = elimination.starts(goals, roots.angle + first[roots.owner])
+        # False for errors that are no numbers, as are those of joint values that are none.
+        closed = error <= _CLOSES
+    moved = np.flatnonzero(~closed)
+    if len(moved):
+        moved = moved[np.isfinite(q[moved]).all(axis=1)]
+        q[moved], closed[moved] = refined(description, q[moved], goals[of_root[moved]])
 
-    expected = np.bincount(roots.owner[roots.is_real], minlength=len(poses))
-    expected[roots.owner] = np.maximum(expected[roots.owner], 1)
-    is_delicate = np.zeros(len(poses), dtype=bool)
-    is_delicate[_with_near_roots(roots)] = True
-    return Found(q, owner, expected, beyond < _INEXACT, is_delicate)
-
-
-def _with_near_roots(roots: trigonometric.Roots) -> NDArray[np.intp]:
-    """Return the indices of polynomials of which two roots nearly coincide."""
-    is_near = roots.height < _NEAR_ROOTS
-    number = roots.angle[is_near] + _SPACING * roots.owner[is_near]
-    order = np.argsort(number)
-    owner = roots.owner[is_near][order]
-    are_near = np.diff(number[order]) < _NEAR_ROOTS
-    # The first and the last root of a polynomial may be near to each other through pi.
-    ends = np.flatnonzero(np.diff(owner, prepend=-1, append=-1))
-    begin = ends[:-1]
-    last = ends[1:] - 1
-    through_pi = number[order][last] - number[order][begin] > 2 * np.pi - _NEAR_ROOTS
-    return np.concatenate([owner[1:][are_near], owner[begin][through_pi]])
+    # Solutions of a pose that come from roots apart differ in that joint, unless they moved far from their roots.
+    is_doubtful = roots.is_delicate.copy()
+    is_doubtful[roots.owner[of_root[moved]]] = True
+    q = q[closed]
+    of_root = of_root[closed]
+    owner = roots.owner[of_root]
+    is_doubtful[owner[1:][of_root[1:] == of_root[:-1]]] = True
+    rows = np.flatnonzero(is_doubtful[owner])
+    if len(rows):
+        is_one = np.ones(len(q), dtype=bool)
+        is_one[rows] = are_distinct(q[rows], owner[rows])
+        q = q[is_one]
+        owner = owner[is_one]
+    return Found(q, owner, roots.expected, roots.error < _INEXACT, roots.is_delicate)
 
 
-def _polished(
-    description: Description, starts: Array, goals: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the ends (K, 6) of Newton's method, and whether they close; starts that close already stay where they are.
+def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return which solutions (K, n), rad, to keep so that of equal ones of a pose one is left, shape (K,).
 
-    Angles are in (-pi, pi].
-    """
-    newton = Newton.of(description, position_only=False, limits=False)
-    starts = starts - math.tau * np.ceil((starts - math.pi) / math.tau)
-    with np.errstate(all="ignore"):
-        closed = closes(newton.error(starts, goals), _CLOSES)
-    rest = np.flatnonzero(~closed)
-    starts[rest], closed[rest] = refined(description, starts[rest], goals[rest])
-    return starts, closed
-
-
-def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Return solutions (K, n), rad, without those that another one of the same pose equals, and their poses (K,).
-
-    Poses are in ascending order, the solutions of each in no particular one.
+    Parameters
+    ----------
+    q
+        Solutions in any order.
+    owner
+        The pose of each, shape (K,).
     """
     # Equal solutions of a pose have equal numbers, whole turns included, and so lie next to each other.
     number = np.cos(q[:, :_NUMBERED] + np.arange(_NUMBERED)).sum(axis=1) + _SPACING * owner
     order = np.argsort(number)
-    q = q[order]
-    owner = owner[order]
+    in_order = q[order]
     number = number[order]
     is_new = np.ones(len(q), dtype=bool)
     for lag in range(1, len(q)):
@@ -164,6 +146,16 @@ def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]
         if not len(near):
             break
         # |e^(ia) - e^(ib)| = 2 |sin((a - b) / 2)|, about |a - b|.
-        apart = 2 * np.abs(np.sin((q[near + lag] - q[near]) / 2)).max(axis=1)
-        is_new[near[apart <= _SAME_SOLUTION] + lag] = False
-    return q[is_new], owner[is_new]
+        apart = 2 * np.abs(np.sin((in_order[near + lag] - in_order[near]) / 2)).max(axis=1)
+        is_new[order[near[apart <= _SAME_SOLUTION] + lag]] = False
+    return is_new
+
+
+def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Return solutions (K, n), rad, without those that another one of the same pose equals, and their poses (K,).
+
+    Those of a pose are together, and poses in ascending order.
+    """
+    order = np.argsort(owner, kind="stable")
+    rows = order[are_distinct(q[order], owner[order])]
+    return q[rows], owner[rows]

@@ -33,8 +33,8 @@ from dhkit.kinematics.polynomial.trigonometric import SAMPLES
 if TYPE_CHECKING:
     from dhkit.symbolic import Graph
 
-_ALSO_FITS = 1e-6
-"""Residual, a share of the squared reach, of combinations of signs that may also be solutions: two at the same q1."""
+_OUTPUTS = {"value": 1, "signs": 2, "joints": 2}
+"""Number of outputs of the programs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ class TwoParallel:
         run(self.parameters, [np.repeat(poses, angles.shape[1], axis=0), pairs], [values])
         return values.reshape(angles.shape)
 
-    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array]:
+    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array, Array]:
         """Return joint values near the solutions at roots of the polynomial.
 
         Parameters
@@ -129,23 +129,30 @@ class TwoParallel:
 
         Returns
         -------
-        tuple[NDArray[np.intp], Array]
-            Indices of the roots, shape (L,), and joint values, shape (L, 6), rad. A root that serves several
-            combinations of signs has several.
+        tuple[NDArray[np.intp], Array, Array]
+            Indices of the roots, shape (L,), ascending; joint values, shape (L, 6), rad, in (-pi, pi]; and their
+            errors, shares of the reach and rad, shape (L,). A root that serves several combinations of signs has several
+            solutions.
         """
-        residuals = np.empty((len(poses), len(SIGNS)))
+        count = len(poses)
         q_1 = angles[:, None]
-        _kernel("residuals", self.meeting)(self.parameters, [poses, q_1], [residuals])
-        residuals = np.where(np.isfinite(residuals), residuals, np.inf)
-        fits = residuals <= _ALSO_FITS
-        best = residuals.argmin(axis=1)
-        fits[np.arange(len(poses)), best] = True
-        rows, choice = np.nonzero(fits & np.isfinite(residuals))
+        signs = np.empty((count, 2))
+        also = np.empty((count, len(SIGNS)))
+        _kernel("signs", self.meeting)(self.parameters, [poses, q_1], [signs, also])
+        rows = np.arange(count)
+        if (also > 0).any():
+            more, choice = np.nonzero(also > 0)
+            rows = np.concatenate([rows, more])
+            order = np.argsort(rows, kind="stable")
+            rows = rows[order]
+            signs = np.concatenate([signs, np.array(SIGNS)[choice]])[order]
+            poses = poses[rows]
+            q_1 = q_1[rows]
 
         q = np.empty((len(rows), 6))
-        signs = np.array(SIGNS)[choice]
-        _kernel("joints", self.meeting)(self.parameters, [poses[rows], q_1[rows], signs], [q])
-        return rows, q
+        error = np.empty((len(rows), 1))
+        _kernel("joints", self.meeting)(self.parameters, [poses, q_1, signs], [q, error])
+        return rows, q, error[:, 0]
 
 
 def _kernel(name: str, meeting: tuple[int, int]) -> Kernel:
@@ -156,12 +163,12 @@ def _kernel(name: str, meeting: tuple[int, int]) -> Kernel:
 
         derive = {
             "value": programs.value_program,
-            "residuals": programs.residual_program,
+            "signs": programs.signs_program,
             "joints": programs.joints_program,
         }
         return derive[name](meeting)
 
-    return kernel(f"two_parallel_{name}", f"{meeting}", derived)
+    return kernel(f"two_parallel_{name}", f"{meeting}", derived, ("float64",) * _OUTPUTS[name])
 
 
 def _scaled(T: Array, length: float) -> Array:

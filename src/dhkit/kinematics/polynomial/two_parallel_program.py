@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -26,6 +27,8 @@ _POLISHING_STEPS = 2
 """Newton steps from a root of the polynomial, whose error is about 1e-10 rad, to rounding."""
 _LARGEST_STEP = 1e-3
 """Larger steps, rad, are not taken: near a double root they lead elsewhere."""
+_ALSO_FITS = 1e-6
+"""Residual, a share of the squared reach, of combinations of signs that may also be solutions: two at the same q1."""
 
 
 def value_program(meeting: tuple[int, int]) -> Graph:
@@ -48,23 +51,39 @@ def value_program(meeting: tuple[int, int]) -> Graph:
     return Graph.of("two_parallel_value", inputs, {"value": value})
 
 
-def residual_program(meeting: tuple[int, int]) -> Graph:
-    """Return the program that tells which signs fit: T and q1 to |F|, and by how much squares are negative, of each."""
+def signs_program(meeting: tuple[int, int]) -> Graph:
+    """Return the program that tells which signs fit: T and q1 near a root of F to the signs, NaN if there are none.
+
+    ``signs`` are those with the least residual: |F| and by how much squares are negative. ``also`` tells of each
+    combination, but for that one, whether it fits too.
+    """
     parameters, T = _symbols()
     q_1 = ca.SX.sym("q_1")
     p = _Numbers.read(parameters)
+    # A comparison with NaN is false: residuals that are no numbers fit nothing.
+    least = ca.SX(math.inf)
+    signs = ca.SX([math.nan, math.nan])
     residuals = []
-    for signs in SIGNS:
-        arm, deficit = _real(p, meeting, T, q_1, signs)
-        residuals.append(ca.fabs(arm.F) + deficit)
+    for some in SIGNS:
+        arm, deficit = _real(p, meeting, T, q_1, some)
+        residual = ca.fabs(arm.F) + deficit
+        residuals.append(residual)
+        is_better = residual < least
+        signs = ca.if_else(is_better, ca.SX(some), signs)
+        least = ca.if_else(is_better, residual, least)
+    also = []
+    for some, residual in zip(SIGNS, residuals, strict=True):
+        is_chosen = ca.logic_and(signs[0] == some[0], signs[1] == some[1])
+        also.append(ca.logic_and(residual <= _ALSO_FITS, ca.logic_not(is_chosen)))
     inputs = {"parameters": parameters, "T": T, "q_1": q_1}
-    return Graph.of("two_parallel_residuals", inputs, {"residuals": ca.vertcat(*residuals)})
+    return Graph.of("two_parallel_signs", inputs, {"signs": signs, "also": ca.vertcat(*also)})
 
 
 def joints_program(meeting: tuple[int, int]) -> Graph:
-    """Return the program of the joints: T, q1 near a root of F, and the signs, to q with q1 at the root.
+    """Return the program of the joints: T, q1 near a root of F, and the signs, to q with q1 at the root, and its error.
 
-    It takes Newton steps q1 - F / F'.
+    It takes Newton steps q1 - F / F'. Angles are in (-pi, pi]. The error is the larger one of position, a share of the
+    reach, and rotation, rad, for which its sine is taken.
     """
     parameters, T = _symbols()
     q_1 = ca.SX.sym("q_1")
@@ -91,8 +110,40 @@ def joints_program(meeting: tuple[int, int]) -> Graph:
     )
     thetas = [theta_2, theta_3, *(ca.atan2(sine, cosine) for cosine, sine in arm.wrist)]
     q = [x, *(theta - p.offset[k] for k, theta in enumerate(thetas, start=1))]
+    q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
     inputs = {"parameters": parameters, "T": T, "q_1": q_1, "signs": signs}
-    return Graph.of("two_parallel_joints", inputs, {"q": ca.vertcat(*q)})
+    outputs = {"q": ca.vertcat(*q), "error": _error(p, T, q)}
+    return Graph.of("two_parallel_joints", inputs, outputs)
+
+
+def _error(p: _Numbers, T: SX, q: list[SX]) -> SX:
+    """Return the error of the tool's pose at joint values."""
+    R_goal, p_goal = _last_frame(p, T)
+    R = ca.SX.eye(3)
+    position = ca.SX.zeros(3)
+    for k, angle in enumerate(q, start=1):
+        # Joint k turns about z, link k leads along z and x, and turns about x.
+        R = R @ _rotation(2, *_pair(angle + p.offset[k - 1]))
+        if k < len(q):
+            position = position + R @ ca.vertcat(p.a[k], 0.0, p.d[k])
+            R = R @ _rotation(0, *p.alpha[k])
+
+    # The tool is at -R_t^T p_t in the last frame, with the last frame (R_t, p_t) as seen from the tool.
+    turned = R_goal - R
+    tool = p.T_tool_last[:, :3].T @ -p.T_tool_last[:, 3]
+    shift = p_goal - position + turned @ tool
+    # |R_g - R|_F = sqrt(8) sin(t / 2) for rotations that are t apart: over sqrt(2) it is t for small ones.
+    return ca.sqrt(ca.fmax(ca.sumsqr(shift), ca.sumsqr(turned) / 2.0))
+
+
+def _pair(angle: SX) -> Pair:
+    return ca.cos(angle), ca.sin(angle)
+
+
+def _rotation(axis: int, cosine: SX, sine: SX) -> SX:
+    """Return a rotation about axis x (0) or z (2), 3 x 3."""
+    turn = ca.blockcat([[cosine, -sine], [sine, cosine]])
+    return ca.diagcat(turn, 1.0) if axis == 2 else ca.diagcat(1.0, turn)
 
 
 def _symbols() -> tuple[SX, SX]:
@@ -240,10 +291,7 @@ def _assembled(
 
 def _seen_from_link_1(p: _Numbers, T: SX, theta_1: Pair) -> tuple[SX, Vector]:
     """Return rotation (3 x 3) and position of the last frame behind joint 1 and link 1."""
-    R = p.T_first_world[:, :3] @ T[:3, :3]
-    position = p.T_first_world[:, :3] @ (T[:3, 3] * p.per_length) + p.T_first_world[:, 3]
-    position = position + R @ p.T_tool_last[:, 3]
-    R = R @ p.T_tool_last[:, :3]
+    R, position = _last_frame(p, T)
 
     def seen(vector: Vector) -> Vector:
         """Return a vector of frame 0 as seen behind joint 1."""
@@ -256,6 +304,14 @@ def _seen_from_link_1(p: _Numbers, T: SX, theta_1: Pair) -> tuple[SX, Vector]:
         ca.horzcat(*(ca.vertcat(*column) for column in columns)),
         turned_about_x((x - p.a[1], y, z), twist, -1.0),
     )
+
+
+def _last_frame(p: _Numbers, T: SX) -> tuple[SX, SX]:
+    """Return rotation (3 x 3) and position (3 x 1) of the last frame in frame 0, from the tool's pose in the world."""
+    R = p.T_first_world[:, :3] @ T[:3, :3]
+    position = p.T_first_world[:, :3] @ (T[:3, 3] * p.per_length) + p.T_first_world[:, 3]
+    position = position + R @ p.T_tool_last[:, 3]
+    return R @ p.T_tool_last[:, :3], position
 
 
 def _on_circle(

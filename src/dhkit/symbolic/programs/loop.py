@@ -25,12 +25,16 @@ class Loop:
         Inputs as for ``step``; outputs those of the program.
     most
         Largest number of steps.
+    in_lanes
+        Whether batches are computed in the lanes of vectors, each until its slowest item is done. It pays where items
+        take about the same number of steps.
     """
 
     begin: Graph
     step: Graph
     finish: Graph
     most: int
+    in_lanes: bool = False
 
     def __post_init__(self) -> None:
         state, fixed = (variable.size for variable in self.begin.outputs)

@@ -1,0 +1,216 @@
+"""Program from values of a trigonometric polynomial to its real roots: coefficients, Aberth's method, what is real."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+from dhkit.kinematics.polynomial.extension import Extension, Root
+from dhkit.symbolic import Graph, Loop
+
+SX: TypeAlias = Any
+"""A CasADi SX scalar or vector."""
+
+BEYOND = 4.0
+"""Stands for the angle of a root that is not nearly real, rad: no angle is beyond pi."""
+_IMAGINARY_UNIT = Root(-1.0)
+_MOST_STEPS = 60
+"""Largest number of Aberth's steps; most polynomials take 7 to 12."""
+_CONVERGED = 1e-7
+"""Estimates whose last steps are below this share of their absolute value are roots: steps shrink by their cubes."""
+_FIRST_RADII = (0.95, 1.05)
+_FIRST_ANGLE = 0.4
+"""The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps would keep both."""
+_ROUNDING = 4e-15
+"""A value below this share of the sum of the terms' absolute values is rounding: its estimate is a root."""
+_NEARLY_REAL = 3e-2
+"""Largest imaginary part, rad, of a root that is tried: rounding of 1e-15 in the coefficients moves a root of
+multiplicity k by its k-th root, 0.013 for k = 8. Whether a solution is there is decided by what follows."""
+_ERROR_OF_VALUE = 1e-11
+"""Assumed error of a polynomial near a root, relative to its largest coefficient. The error itself is some 1e-14; the
+four roots of a pose at two singularities, which it moves by 1e-3, are held to be real with this margin only."""
+_MARGIN = 1e4
+"""Factor of that error, for roots that are tried."""
+_NEAR_ROOTS = 1e-3
+"""Distance of two roots, rad, below which a solution may be singular."""
+
+
+def roots_program(degree: int, samples: int) -> Loop:
+    """Return the program: values at equally spaced angles to what is known of the 2 ``degree`` roots.
+
+    The outputs are, with z = e^(i (angle + i height)):
+
+    - ``angle``, rad, in [-pi, pi]; ``BEYOND`` for a root whose height is beyond ``_NEARLY_REAL``, or which is not real
+      even if the error of f is ``_MARGIN`` times the assumed one;
+    - ``is_real``, whether the height is 0 up to the root's error, |height f'| < error of f;
+    - ``is_delicate``, one number: whether two roots nearly coincide, so that a solution may be singular;
+    - ``error``, one number: the largest coefficient beyond the degree, relative to the others; infinite for values that
+      are all 0.
+    """
+    parameters = ca.SX.sym("none")
+    values = ca.SX.sym("values", samples)
+    inputs: dict[str, SX] = {"parameters": parameters, "values": values}
+    numbers, error = _coefficients(values, degree)
+    first = _Roots.first(degree)
+    outputs: dict[str, SX] = {"state": first.vector, "fixed": ca.vertcat(numbers, error)}
+    begin = Graph.of("roots_begin", inputs, outputs)
+
+    fixed = ca.SX.sym("fixed", 2 * degree + 2)
+    state = ca.SX.sym("state", 4 * degree)
+    within = {**inputs, "fixed": fixed, "state": state}
+    polynomial = _polynomial(fixed[:-1], degree)
+    roots = _Roots.read(state)
+    after, step = _stepped(polynomial, roots)
+    goes_on = ca.if_else(step >= _CONVERGED, 1.0, 0.0)
+    step_graph = Graph.of("roots_step", within, {"state": after.vector, "goes_on": goes_on})
+
+    finish = Graph.of("roots", within, _real_roots(polynomial, roots, fixed[-1]))
+    return Loop(begin, step_graph, finish, _MOST_STEPS, in_lanes=True)
+
+
+@dataclass(frozen=True)
+class _Roots:
+    """Estimates of the roots."""
+
+    z: list[Extension]
+
+    @classmethod
+    def first(cls, degree: int) -> _Roots:
+        """Return the first estimates."""
+        count = 2 * degree
+        numbers = [
+            cmath.rect(_FIRST_RADII[k % 2], _FIRST_ANGLE + math.tau / count * k)
+            for k in range(count)
+        ]
+        return cls([_complex(ca.SX(z.real), ca.SX(z.imag)) for z in numbers])
+
+    @classmethod
+    def read(cls, state: SX) -> _Roots:
+        """Return the estimates of a state: their real parts, then their imaginary parts."""
+        entries = ca.vertsplit(state)
+        count = len(entries) // 2
+        return cls([_complex(entries[k], entries[count + k]) for k in range(count)])
+
+    @property
+    def vector(self) -> SX:
+        """The estimates as a state."""
+        return ca.vertcat(*(z.x for z in self.z), *(z.y for z in self.z))
+
+
+def _coefficients(values: SX, degree: int) -> tuple[SX, SX]:
+    """Return the coefficients of f = sum c_k z^k for k from -degree to degree, and their error.
+
+    They are c_0, the real and then the imaginary parts of c_1 to c_degree, and the largest of absolute value is 1. The
+    error is the largest of those that follow, which are 0 but for rounding.
+    """
+    samples = values.shape[0]
+    real = []
+    imaginary = []
+    for k in range(samples // 2 + 1):
+        # c_k = 1/N sum_j f_j e^(-2 pi i j k / N).
+        angles = [-math.tau * (j * k % samples) / samples for j in range(samples)]
+        real.append(ca.dot(ca.DM([math.cos(angle) for angle in angles]), values) / samples)
+        imaginary.append(ca.dot(ca.DM([math.sin(angle) for angle in angles]), values) / samples)
+
+    sizes = [ca.sqrt(x * x + y * y) for x, y in zip(real, imaginary, strict=True)]
+    largest = reduce(ca.fmax, sizes[: degree + 1])
+    beyond = reduce(ca.fmax, sizes[degree + 1 :])
+    factor = 1.0 / ca.if_else(largest > 0, largest, 1.0)
+    numbers = ca.vertcat(*real[: degree + 1], *imaginary[1 : degree + 1]) * factor
+    return numbers, ca.if_else(largest > 0, beyond * factor, math.inf)
+
+
+def _stepped(polynomial: list[Extension], roots: _Roots) -> tuple[_Roots, SX]:
+    """Return the estimates after a step of Aberth's method, and the largest step as a share of |z|.
+
+    Each estimate moves by
+
+        -p / (p' - p sum_j 1 / (z - z_j)),
+
+    which is Newton's step for p over the product of all other z - z_j (Aberth 1973, Math. Comp. 27). A step counts as 0
+    where p is 0 up to rounding, as it is in a whole neighbourhood of a double root.
+    """
+    sums = [_complex(ca.SX(0.0), ca.SX(0.0)) for _ in roots.z]
+    for i, root in enumerate(roots.z):
+        for j in range(i):
+            one_over = (root - roots.z[j]).inverse
+            sums[i] = sums[i] + one_over
+            sums[j] = sums[j] - one_over
+
+    sizes = [ca.sqrt(c.x * c.x + c.y * c.y) for c in polynomial]
+    moved = []
+    steps = []
+    for root, repulsion in zip(roots.z, sums, strict=True):
+        p, slope = _horner(polynomial, root)
+        step = p * (slope - p * repulsion).inverse
+        length = ca.sqrt(step.x * step.x + step.y * step.y)
+        is_finite = length < 1e300
+        step = _complex(ca.if_else(is_finite, step.x, 0.0), ca.if_else(is_finite, step.y, 0.0))
+        moved.append(root - step)
+
+        radius = ca.sqrt(root.x * root.x + root.y * root.y)
+        largest = reduce(lambda value, size: value * radius + size, sizes)
+        is_root = ca.fabs(p.x) + ca.fabs(p.y) < _ROUNDING * largest
+        steps.append(ca.if_else(is_root, 0.0, length / radius))
+    return _Roots(moved), reduce(ca.fmax, steps)
+
+
+def _real_roots(polynomial: list[Extension], roots: _Roots, error: SX) -> dict[str, SX]:
+    """Return the outputs of :func:`roots_program`."""
+    tolerance = ca.fmax(_ERROR_OF_VALUE, error)
+    near = []
+    heights = []
+    are_real = []
+    for root in roots.z:
+        square = root.x * root.x + root.y * root.y
+        # ln(square) / 2 of a square near 1, up to its cube.
+        height = ca.fabs((square - 1.0) / (square + 1.0))
+        # f = p / z^degree and |z| is about 1: |f'| = |p'| at a root, and f is height f' at the real angle beside it.
+        _, slope = _horner(polynomial, root)
+        value = height * ca.sqrt(slope.x * slope.x + slope.y * slope.y)
+        is_tried = ca.logic_and(height < _NEARLY_REAL, value < _MARGIN * tolerance)
+        near.append(ca.if_else(is_tried, ca.atan2(root.y, root.x), BEYOND))
+        heights.append(height)
+        are_real.append(ca.if_else(value < tolerance, 1.0, 0.0))
+
+    is_delicate = ca.SX(0.0) > 0.0
+    for i, root in enumerate(roots.z):
+        for j in range(i):
+            # e^(i x) - e^(i y) is as long as x - y, through pi too, and heights count like angles.
+            apart = root - roots.z[j]
+            is_near = apart.x * apart.x + apart.y * apart.y < _NEAR_ROOTS**2
+            is_delicate = ca.logic_or(is_delicate, ca.logic_and(is_near, heights[i] < _NEAR_ROOTS))
+    return {
+        "angle": ca.vertcat(*near),
+        "is_real": ca.vertcat(*are_real),
+        "is_delicate": ca.if_else(is_delicate, 1.0, 0.0),
+        "error": error,
+    }
+
+
+def _complex(x: SX, y: SX) -> Extension:
+    """Return x + i y."""
+    return Extension(x, y, _IMAGINARY_UNIT)
+
+
+def _polynomial(numbers: SX, degree: int) -> list[Extension]:
+    """Return the coefficients from that of z^(2 degree) to that of z^0: c_degree, ..., c_0, ..., conj(c_degree)."""
+    upper = [_complex(numbers[k], numbers[degree + k]) for k in range(degree, 0, -1)]
+    middle = _complex(numbers[0], 0.0)
+    lower = [_complex(c.x, -c.y) for c in reversed(upper)]
+    return [*upper, middle, *lower]
+
+
+def _horner(polynomial: list[Extension], x: Extension) -> tuple[Extension, Extension]:
+    """Return the value of a polynomial, highest coefficient first, and that of its derivative."""
+    value = polynomial[0]
+    slope = value * 0.0
+    for coefficient in polynomial[1:]:
+        slope = slope * x + value
+        value = value * x + coefficient
+    return value, slope
