@@ -19,7 +19,13 @@ from dhkit.kinematics.jacobian import (
     jacobian_kernel,
 )
 from dhkit.kinematics.numeric_call import NumericCall, numeric_call
-from dhkit.kinematics.pose_call import PoseCall, RedundantCall, pose_call, redundant_call
+from dhkit.kinematics.pose_call import (
+    EliminationCall,
+    PoseCall,
+    RedundantCall,
+    pose_call,
+    redundant_call,
+)
 from dhkit.kinematics.solutions import IKSolutions
 
 ArrayCall: TypeAlias = Callable[..., Array | None]
@@ -114,7 +120,7 @@ class ArmCalls:
         """Return the function of a quantity that is asked for the first time."""
         call: FastCall | None
         if name == "ik":
-            call = pose_call(self._description)
+            call = pose_call(self._description, partial(setattr, self, name))
         elif name == "ik_at_redundancy":
             call = redundant_call(self._description)
         elif name == "ik_numeric":
@@ -134,7 +140,7 @@ class ArmCalls:
             if call is not None:
                 call.compile()
             yield name
-        if isinstance(self.ik, PoseCall):
+        if isinstance(self.ik, PoseCall | EliminationCall):
             self.ik.compile()
         if isinstance(self.ik_at_redundancy, RedundantCall):
             self.ik_at_redundancy.compile()

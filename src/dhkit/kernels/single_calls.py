@@ -12,7 +12,6 @@ import ctypes
 import logging
 import sys
 import sysconfig
-import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import prod
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.display import repr_line
+from dhkit.kernels.background import CALLS_BEFORE_COMPILING, Background
 from dhkit.kernels.call_source import (
     AXES_OFFSET,
     CONTEXT,
@@ -41,9 +41,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-CALLS_BEFORE_COMPILING = 200
-"""A quantity is compiled for single calls when so many were made: they took about as long as compiling takes."""
-
 _METH_FASTCALL = 0x0080
 _NUMPY_ABI = 0x02000000
 """NumPy's binary interface, the same for all versions 2.x."""
@@ -51,8 +48,6 @@ _GET_ABI = 0
 _ARRAY_TYPE = 2
 _NEW_ARRAY = 93
 """Indices in NumPy's C interface: ``PyArray_GetNDArrayCVersion``, ``PyArray_Type`` and ``PyArray_New``."""
-_SMALLEST_STACK = 2**18
-"""Smallest stack of a thread that LLVM is given, bytes; the usual ones have 8 MB."""
 _AGREEMENT = 1e-9
 """Largest difference from the ordinary way at which a new function is used, relative to the largest entry."""
 
@@ -100,8 +95,7 @@ class SingleCall:
         self._install = install
         self._refuses_nan = refuses_nan
         self._example = example
-        self._calls = 0
-        self._thread: threading.Thread | None = None
+        self._background = Background(kernel.name, self._compile_in_thread)
 
     def __call__(self, *arguments: object) -> Any:
         """Count a call; return None, or the result where ``DHKIT_KERNELS`` is ``on``."""
@@ -111,13 +105,11 @@ class SingleCall:
         if mode == "off":
             self._install(never)
             return None
-        self._calls += 1
-        if self._calls % CALLS_BEFORE_COMPILING == 0:
-            self._start()
+        self._background.count()
         return None
 
     def __repr__(self) -> str:
-        counted = f"{self._calls} of {CALLS_BEFORE_COMPILING} calls"
+        counted = f"{self._background.calls} of {CALLS_BEFORE_COMPILING} calls"
         return repr_line(f"SingleCall {self._kernel.name}", summary=f"not compiled, {counted}")
 
     def compile(self) -> FastCall:
@@ -126,21 +118,6 @@ class SingleCall:
             function = self._compiled()
         self._install(function)
         return function
-
-    def _start(self) -> None:
-        """Compile in a thread, unless one is at work; after a fork, the parent's thread is not alive in the child."""
-        if self._thread is not None and self._thread.is_alive():
-            return
-        if 0 < threading.stack_size() < _SMALLEST_STACK:
-            return
-        self._thread = threading.Thread(
-            target=self._compile_in_thread, name=f"compile {self._kernel.name}", daemon=False
-        )
-        try:
-            self._thread.start()
-        except RuntimeError:
-            # The interpreter is shutting down.
-            self._thread = None
 
     def _compile_in_thread(self) -> None:
         try:

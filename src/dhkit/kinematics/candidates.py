@@ -65,11 +65,14 @@ def collect(
     singular = np.any(special & SINGULARITIES != 0, axis=-1)
 
     reached = np.where(singular, IKStatus.singular, IKStatus.ok)
-    beyond = is_beyond_all_links(description, positions)
-    if none_exist is not None:
-        beyond |= none_exist
-    missed = np.where(beyond, IKStatus.out_of_reach, IKStatus.not_found)
-    status = np.where(found, reached, missed)
+    if found.all():
+        status = reached
+    else:
+        beyond = is_beyond_all_links(description, positions)
+        if none_exist is not None:
+            beyond |= none_exist
+        missed = np.where(beyond, IKStatus.out_of_reach, IKStatus.not_found)
+        status = np.where(found, reached, missed)
     status = np.where(posed, status, IKStatus.not_a_pose)
     return IKSolutions(
         q=q,
@@ -90,11 +93,11 @@ def collect(
 def are_poses(T: Array) -> NDArray[np.bool_]:
     """Return whether matrices (..., 4, 4) are poses, shape (...): finite, orthonormal to 2e-6, last row 0 0 0 1."""
     with np.errstate(over="ignore", invalid="ignore"):
-        # R^T R = 1 and det R = (r_1 x r_2) . r_3 > 0, with the columns r_k of R.
+        # R^T R = 1 and det R > 0.
         R = T[..., :3, :3]
         defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
         bottom = np.abs(T[..., 3, :] - (0, 0, 0, 1)).max(axis=-1)
-        proper = np.einsum("...i,...i", np.cross(R[..., 0], R[..., 1]), R[..., 2]) > 0
+        proper = np.linalg.det(R) > 0
         finite = np.isfinite(T).all(axis=(-1, -2))
     posed: NDArray[np.bool_] = finite & proper & (defect <= ORTHONORMAL) & (bottom <= ORTHONORMAL)
     return posed

@@ -9,15 +9,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
-from dhkit.kernels import pose_rows
+from dhkit.kernels import Kernel, pose_rows
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.closed_form.formulas import SINGULAR
-from dhkit.kinematics.jacobian import jacobian
+from dhkit.kinematics.jacobian import jacobian, jacobian_kernel
 from dhkit.kinematics.manipulability import freedoms
+from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.six_joints import six_joints
+from dhkit.kinematics.polynomial.trigonometric import roots_kernel
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
 SAME_ANGLE = 1e-6
@@ -85,11 +87,27 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     )
 
 
+def elimination_kernels(description: Description) -> list[Kernel]:
+    """Return the kernels that :func:`solve_by_elimination` uses for an arm of six revolute joints.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    newton = Newton.of(description, position_only=False, limits=False)
+    descent, _ = descent_kernel(description, newton.size)
+    of_jacobian, _ = jacobian_kernel(description, "world")
+    return [*six_joints(description).elimination.kernels, roots_kernel(), descent, of_jacobian]
+
+
 def _singular_flags(
     description: Description, q: Array, is_delicate: NDArray[np.bool_]
 ) -> NDArray[np.uint8]:
     """Return the flags of singular solutions (N, B, n) of delicate poses (N,), shape (N, B)."""
     flags = np.zeros(q.shape[:2], dtype=np.uint8)
+    if not is_delicate.any():
+        return flags
     is_asked = is_delicate[:, None] & ~np.isnan(q).any(axis=-1)
     J = jacobian(description, q[is_asked])
     # Without units: velocities over the reach.

@@ -15,6 +15,7 @@ polynomial.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -24,8 +25,10 @@ from numpy.typing import NDArray
 from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description
 from dhkit.description.poses import inverse_pose
+from dhkit.kernels import Kernel
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.newton import Newton, magnitude
+from dhkit.kinematics.forward import tool_kernel
+from dhkit.kinematics.newton import Newton, error_kernel, magnitude
 
 Complex: TypeAlias = "NDArray[np.complex128]"
 Coefficients: TypeAlias = "tuple[Array, Array, Array]"
@@ -46,7 +49,23 @@ _DOUBLE = 1e-7
 """Share of a matrix's norm below which a second vector counts as taken to 0."""
 _MIXED = 0.7 + 0.3j
 """Factor t of t x + y, by which two solutions differ even if they share x or y."""
-_OF_TWO_POWERS = np.kron(_AS_POWERS, _AS_POWERS)
+_OF_TWO_POWERS: Complex = np.kron(_AS_POWERS, _AS_POWERS)
+_EACH = slice(None)
+
+
+@dataclass(frozen=True, eq=False)
+class _FarSide:
+    """The equations' side of the far joints for N poses: ``constant`` + Q R p, with the products p without 1."""
+
+    six: tuple[Complex, Complex, Complex]
+    """Six equations without p, in powers of e^(i q) of joints i + 1 and i + 2, shape (N, 6, 9) each: what does not
+    depend on joint i, and what its cosine and its sine are multiplied by."""
+    constant: Array
+    """Shape (N, 14)."""
+    Q: Array
+    """Orthonormal columns, shape (N, 14, 8)."""
+    R: Array
+    """Triangular, shape (N, 8, 8)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +101,12 @@ class General:
         )
         return [replace(arm, joint=joint) for joint in (3, 2, 1) for arm in (self, from_tool)]
 
+    @property
+    def kernels(self) -> Sequence[Kernel]:
+        """The kernels of the errors; all else is linear algebra by LAPACK."""
+        tool, _ = tool_kernel(self.newton.description)
+        return [tool, error_kernel(self.newton.size)]
+
     def first_angle(self, poses: Array) -> Array:
         """Return the first angle at which the polynomial is evaluated, shape (N,)."""
         return np.full(len(poses), 0.1)
@@ -96,20 +121,22 @@ class General:
         angles
             Angles of the joint, shape (N, S), rad.
         """
-        reduced, _ = self._reduced(self._motions(poses))
-        values = [np.linalg.det(_matrix(reduced, angle)) for angle in angles.T]
+        six = self._reduced(self._motions(poses)).six
+        values = [np.linalg.det(_matrix(six, angle)) for angle in angles.T]
         # The determinant is real up to a constant factor of absolute value 1.
         return np.asarray((np.stack(values, axis=1) * self._phase).real)
 
-    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    def starts(
+        self, poses: Array, owner: NDArray[np.intp], angles: Array
+    ) -> tuple[NDArray[np.intp], Array, Array]:
         """Return joint values near the solutions at roots of the polynomial.
 
         Parameters
         ----------
         poses
-            Shape (K, 16), m.
-        angles
-            A root for each, shape (K,), rad.
+            Shape (N, 16), m.
+        owner, angles
+            Index of each root's pose, and the roots, shape (K,) each, rad.
 
         Returns
         -------
@@ -117,13 +144,14 @@ class General:
             Indices of the roots, shape (L,), ascending; joint values, shape (L, 6), rad, in (-pi, pi]; and their
             errors, shares of the reach and rad, shape (L,).
         """
-        goals = poses
         motions = self._motions(poses)
-        reduced, other = self._reduced(motions)
-        of_root, null = _null_vectors(_matrix(reduced, angles))
+        side = self._reduced(motions)
+        of_root, null = _null_vectors(_matrix(side.six, angles, owner))
+        order = np.argsort(of_root, kind="stable")
+        of_root = of_root[order]
+        null = null[order]
         kept = angles[of_root]
-        motions = motions[of_root]
-        other = other[of_root]
+        owner = owner[of_root]
         second = np.angle((null[:, 1:] * null[:, :-1].conj()).sum(axis=(1, 2)))
         third = np.angle((null[:, :, 1:] * null[:, :, :-1].conj()).sum(axis=(1, 2)))
 
@@ -133,18 +161,14 @@ class General:
             constant + np.cos(kept)[:, None, None] * cosine + np.sin(kept)[:, None, None] * sine
         )
         near = np.einsum("nij,nj->ni", factors, _products(second, third))
-        Q, R = np.linalg.qr(other[:, :, 1:])
-        right = np.swapaxes(Q, 1, 2) @ (near - other[:, :, 0])[:, :, None]
-        products = _solved(R, right)
+        right = (near - side.constant[owner])[:, None, :] @ side.Q[owner]
+        products = _solved(side.R[owner], np.swapaxes(right, 1, 2))
         # Their order is cos b, sin b, cos a, cos a cos b, cos a sin b, sin a, ...
         a = np.arctan2(products[:, 5, 0], products[:, 2, 0])
         b = np.arctan2(products[:, 1, 0], products[:, 0, 0])
-        q = self._joints(motions, (kept, second, third), (a, b))
+        q = self._joints(motions[owner], (kept, second, third), (a, b))
         q -= math.tau * np.ceil((q - math.pi) / math.tau)
-        order = np.argsort(of_root, kind="stable")
-        of_root = of_root[order]
-        q = q[order]
-        return of_root, q, magnitude(self.newton.error(q, goals[of_root]))
+        return of_root, q, magnitude(self.newton.error(q, poses[owner]))
 
     def _joints(
         self, motions: Array, near: tuple[Array, Array, Array], far: tuple[Array, Array]
@@ -184,8 +208,8 @@ class General:
         """Complex number of absolute value 1 that makes determinants real."""
         T = inverse_pose(self.T_tool_world)
         T[:3, 3] += 0.1 * self.newton.length
-        reduced, _ = self._reduced(self._motions(T.reshape(1, 16)))
-        value = np.linalg.det(_matrix(reduced, np.array([0.3])))[0]
+        six = self._reduced(self._motions(T.reshape(1, 16))).six
+        value = np.linalg.det(_matrix(six, np.array([0.3])))[0]
         return complex(np.conj(value) / abs(value)) if value else 1.0
 
     @cached_property
@@ -211,18 +235,15 @@ class General:
         constant[12:] = still[12:]
         return constant, _of_vectors(np.eye(3) - along) @ still, _of_vectors(_cross(axis)) @ still
 
-    def _reduced(self, motions: Array) -> tuple[tuple[Any, Any, Any], Array]:
-        """Return the six equations without the far joints, shape (N, 6, 9) each, and the far side, shape (N, 14, 9).
-
-        The six are in powers of e^(i q) of joints i + 1 and i + 2.
-        """
+    def _reduced(self, motions: Array) -> _FarSide:
+        """Return the far side of the equations at motions (N, 4, 4), and the six equations without the far joints."""
         other = self._far_side(motions)
-        Q, _ = np.linalg.qr(other[:, :, 1:], mode="complete")
+        Q, R = np.linalg.qr(other[:, :, 1:], mode="complete")
         null = np.swapaxes(Q[:, :, _PRODUCTS:], 1, 2)
         constant, cosine, sine = (null @ side for side in self._near_side)
         constant[:, :, 0] -= np.einsum("nij,nj->ni", null, other[:, :, 0])
-        constant, cosine, sine = (side @ _OF_TWO_POWERS for side in (constant, cosine, sine))
-        return (constant, cosine, sine), other
+        six = (constant @ _OF_TWO_POWERS, cosine @ _OF_TWO_POWERS, sine @ _OF_TWO_POWERS)
+        return _FarSide(six, other[:, :, 0], Q[:, :, :_PRODUCTS], R[:, :_PRODUCTS])
 
     def _far_side(self, motions: Array) -> Array:
         """Return the equations' other side in products of the two far joints, shape (N, 14, 9)."""
@@ -302,13 +323,26 @@ def _products(second: Array, third: Array) -> Array:
     return products
 
 
-def _matrix(reduced: tuple[Complex, Complex, Complex], angle: Array) -> Complex:
-    """Return the matrix whose determinant is the polynomial, shape (N, 12, 12), at angles (N,)."""
-    constant, cosine, sine = reduced
-    six = constant + np.cos(angle)[:, None, None] * cosine + np.sin(angle)[:, None, None] * sine
-    matrix = np.zeros((len(six), 12, 12), dtype=complex)
-    matrix[:, :6, :9] = six
-    matrix[:, 6:, 3:] = six
+def _matrix(
+    six: tuple[Complex, Complex, Complex], angle: Array, owner: NDArray[np.intp] | slice = _EACH
+) -> Complex:
+    """Return the matrix whose determinant is the polynomial, shape (K, 12, 12).
+
+    Parameters
+    ----------
+    six
+        See :class:`_FarSide`.
+    angle
+        Angles of joint i, shape (K,), rad.
+    owner
+        Index of the pose of each angle; one for each pose unless given.
+    """
+    constant, cosine, sine = (factor[owner] for factor in six)
+    equations = constant + np.cos(angle)[:, None, None] * cosine
+    equations += np.sin(angle)[:, None, None] * sine
+    matrix = np.zeros((len(equations), 12, 12), dtype=complex)
+    matrix[:, :6, :9] = equations
+    matrix[:, 6:, 3:] = equations
     return matrix
 
 

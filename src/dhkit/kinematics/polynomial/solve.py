@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
+from dhkit.kernels import Kernel
 from dhkit.kinematics.numeric import refined
 from dhkit.kinematics.polynomial import trigonometric
 
@@ -31,16 +33,23 @@ MOST = 16
 class Elimination(Protocol):
     """A way to eliminate all joints but one."""
 
+    @property
+    def kernels(self) -> Sequence[Kernel]:
+        """The kernels that it uses."""
+
     def first_angle(self, poses: Array) -> Array:
         """Return the first angle at which the polynomial is evaluated, shape (N,), for poses (N, 16)."""
 
     def values(self, poses: Array, angles: Array) -> Array:
         """Return values of the polynomial, shape (N, S), at angles (N, S)."""
 
-    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return indices of poses, joint values (L, 6) and errors (L,), for roots (K,) of poses (K, 16).
+    def starts(
+        self, poses: Array, owner: NDArray[np.intp], angles: Array
+    ) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return indices of roots, joint values (L, 6) and errors (L,), for roots (K,) of poses (N, 16).
 
-        Joint values are near solutions, rad, in (-pi, pi]; errors are shares of the reach and rad.
+        ``owner`` tells the pose of each root. Joint values are near solutions, rad, in (-pi, pi]; errors are shares of
+        the reach and rad.
         """
 
 
@@ -100,14 +109,15 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
         first = elimination.first_angle(poses)
         values = elimination.values(poses, first[:, None] + trigonometric.angles())
         roots = trigonometric.real_roots(values)
-        goals = poses[roots.owner]
-        of_root, q, error = elimination.starts(goals, roots.angle + first[roots.owner])
+        angles = roots.angle + first[roots.owner]
+        of_root, q, error = elimination.starts(poses, roots.owner, angles)
         # False for errors that are no numbers, as are those of joint values that are none.
         closed = error <= _CLOSES
     moved = np.flatnonzero(~closed)
     if len(moved):
         moved = moved[np.isfinite(q[moved]).all(axis=1)]
-        q[moved], closed[moved] = refined(description, q[moved], goals[of_root[moved]])
+        goals = poses[roots.owner[of_root[moved]]]
+        q[moved], closed[moved] = refined(description, q[moved], goals)
 
     # Solutions of a pose that come from roots apart differ in that joint, unless they moved far from their roots.
     is_doubtful = roots.is_delicate.copy()

@@ -60,7 +60,7 @@ def real_roots(values: Array) -> Roots:
     is_real = np.empty((count, 2 * DEGREE))
     is_delicate = np.empty((count, 1))
     error = np.empty((count, 1))
-    run = _roots_kernel()
+    run = roots_kernel()
     rows = np.ascontiguousarray(values)
     run(_NO_PARAMETERS, [rows], [angle, is_real, is_delicate, error])
 
@@ -72,7 +72,7 @@ def real_roots(values: Array) -> Roots:
     return Roots(owner, angle[is_near], expected, is_delicate[:, 0] > 0, error[:, 0])
 
 
-def _roots_kernel() -> Kernel:
+def roots_kernel() -> Kernel:
     """Return the kernel of :func:`dhkit.kinematics.polynomial.roots_program.roots_program`."""
 
     def derived() -> Loop:

@@ -15,6 +15,7 @@ measures for each pose whether the coefficients beyond 8 vanish.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -86,6 +87,11 @@ class TwoParallel:
             ]
         )
 
+    @property
+    def kernels(self) -> Sequence[Kernel]:
+        """The kernels of the programs."""
+        return [_kernel(name, self.meeting) for name in _OUTPUTS]
+
     def first_angle(self, poses: Array) -> Array:
         """Return the first angle at which the polynomial is evaluated, shape (N,), rad.
 
@@ -117,24 +123,27 @@ class TwoParallel:
         run(self.parameters, [np.repeat(poses, angles.shape[1], axis=0), pairs], [values])
         return values.reshape(angles.shape)
 
-    def starts(self, poses: Array, angles: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    def starts(
+        self, poses: Array, owner: NDArray[np.intp], angles: Array
+    ) -> tuple[NDArray[np.intp], Array, Array]:
         """Return joint values near the solutions at roots of the polynomial.
 
         Parameters
         ----------
         poses
-            Shape (K, 16), m.
-        angles
-            A root for each, shape (K,), rad.
+            Shape (N, 16), m.
+        owner, angles
+            Index of each root's pose, and the roots, shape (K,) each, rad.
 
         Returns
         -------
         tuple[NDArray[np.intp], Array, Array]
             Indices of the roots, shape (L,), ascending; joint values, shape (L, 6), rad, in (-pi, pi]; and their
-            errors, shares of the reach and rad, shape (L,). A root that serves several combinations of signs has several
-            solutions.
+            errors, shares of the reach and rad, shape (L,). A root that serves several combinations of signs has
+            several solutions.
         """
-        count = len(poses)
+        count = len(angles)
+        poses = poses[owner]
         q_1 = angles[:, None]
         signs = np.empty((count, 2))
         also = np.empty((count, len(SIGNS)))
