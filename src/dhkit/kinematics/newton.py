@@ -186,14 +186,19 @@ def descent_kernel(description: Description, size: int) -> tuple[Kernel, Array]:
 
 def magnitude(error: Array) -> Array:
     """Return the larger one of position and rotation of errors (..., 6) or (..., 3), shape (...)."""
-    squares = error**2
-    position = squares[..., :3].sum(axis=-1)
-    rotation = squares[..., 3:].sum(axis=-1)
-    larger: Array = np.sqrt(np.maximum(position, rotation))
-    return larger
+    return np.sqrt(_largest_square(error))
 
 
 def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
     """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
-    within: NDArray[np.bool_] = magnitude(error) <= tolerance
+    # Squares are compared, as the compiled search does: of far poses both sides are infinite.
+    within: NDArray[np.bool_] = _largest_square(error) <= tolerance**2
     return within
+
+
+def _largest_square(error: Array) -> Array:
+    squares = error**2
+    position = squares[..., :3].sum(axis=-1)
+    rotation = squares[..., 3:].sum(axis=-1)
+    larger: Array = np.maximum(position, rotation)
+    return larger
