@@ -9,9 +9,11 @@ from dhkit.description import Description, takes_robot
 from dhkit.kernels import Kernel
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit, limit_parameters
+from dhkit.kinematics.eliminated import elimination_kernels
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
 from dhkit.kinematics.newton import descent_kernel, error_kernel, step_kernel
+from dhkit.kinematics.redundant import redundant_kernels
 from dhkit.kinematics.solutions import IKFlag, IKStatus
 from dhkit.kinematics.solver import solver_of
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
@@ -47,7 +49,7 @@ def kinematic_kernels(description: Description) -> list[Kernel]:
     Returns
     -------
     list[Kernel]
-        The kernels that ``arm.compile`` compiles; one for closed-form inverse kinematics only where the arm has it.
+        The kernels that ``arm.compile`` compiles; those of inverse kinematics only where the arm has them.
 
     Examples
     --------
@@ -65,8 +67,17 @@ def kinematic_kernels(description: Description) -> list[Kernel]:
     for size in (6, 3):  # Newton's method for whole poses, and for positions
         kernels += [error_kernel(size), step_kernel(description.n, size)]
         kernels.append(descent_kernel(description, size)[0])
+    return [*kernels, *_inverse_kernels(description)]
+
+
+def _inverse_kernels(description: Description) -> list[Kernel]:
+    """Return the kernels of a closed form, at a redundancy too, or of an elimination; none for other arms."""
     solver = solver_of(description)
-    return kernels if solver is None else [*kernels, solver.kernel]
+    if solver is not None:
+        return [solver.kernel]
+    if description.kinds == "RRRRRR":
+        return elimination_kernels(description)
+    return redundant_kernels(description) if description.kinds == "RRRRRRR" else []
 
 
 @takes_robot

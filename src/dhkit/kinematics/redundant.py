@@ -28,13 +28,13 @@ from dhkit.description.arrays import number_array
 from dhkit.description.frames import carrying
 from dhkit.description.poses import inverse_pose
 from dhkit.errors import ModelError
-from dhkit.kernels import EXACT_RANGE, pose_rows
+from dhkit.kernels import EXACT_RANGE, Kernel, pose_rows
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
-from dhkit.kinematics.eliminated import solve_by_elimination
+from dhkit.kinematics.eliminated import elimination_kernels, solve_by_elimination
 from dhkit.kinematics.manipulability import manipulability
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
@@ -55,6 +55,8 @@ _PREFERRED_TOGETHER = 256
 _STEP = np.pi / 360
 _ACCURACY = 1e-9
 """Steps in which intervals of the redundancy are looked for, and accuracy of their ends, rad."""
+_PARTS = 16
+"""Parts into which the place of an end is divided again and again: a call takes about as long as 100 values in it."""
 Preference: TypeAlias = 'Literal["limits", "manipulability"] | ArrayLike'
 """How a redundancy is chosen."""
 
@@ -233,6 +235,18 @@ class _AtRedundancy:
         )
 
 
+def redundant_kernels(description: Description) -> list[Kernel]:
+    """Return the kernels that solve an arm of seven revolute joints at a redundancy.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    """
+    method = _AtRedundancy.of(description).method
+    return [method.kernel] if isinstance(method, Solver) else elimination_kernels(method)
+
+
 def _asked_for(
     description: Description,
     seed: ArrayLike | None,
@@ -376,8 +390,8 @@ def redundancy_intervals(
 ) -> list[tuple[float, float]]:
     """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
 
-    They are found at steps of half a degree, and their ends by bisection to 1e-9 rad: an interval that is narrower than
-    a step may be missing.
+    They are found at steps of half a degree, and their ends to 1e-9 rad: an interval that is narrower than a step may
+    be missing.
 
     Parameters
     ----------
@@ -427,11 +441,17 @@ def redundancy_intervals(
     change = np.flatnonzero(inside[1:] != inside[:-1])
     within = np.where(inside[change], grid[change], grid[change + 1])
     beyond = np.where(inside[change], grid[change + 1], grid[change])
+    shares = np.arange(_PARTS + 1) / _PARTS
     while len(change) and np.abs(within - beyond).max() > _ACCURACY:
-        middle = (within + beyond) / 2
-        reached = is_reached(middle)
-        within = np.where(reached, middle, within)
-        beyond = np.where(reached, beyond, middle)
+        places = within[:, None] + (beyond - within)[:, None] * shares
+        reached = np.ones(places.shape, dtype=bool)
+        reached[:, 1:-1] = is_reached(places[:, 1:-1].ravel()).reshape(len(change), -1)
+        reached[:, -1] = False
+        # The first place that is not reached, and the one before it.
+        first = reached.argmin(axis=1)
+        rows = np.arange(len(change))
+        within = places[rows, first - 1]
+        beyond = places[rows, first]
 
     ends = [*grid[:1][inside[:1]], *within, *grid[-1:][inside[-1:]]]
     return [(float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)]
