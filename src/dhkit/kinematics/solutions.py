@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from itertools import islice, product
@@ -110,8 +110,24 @@ class IKSolutions:
         )
         return solutions
 
+    def with_later_distance(self, distance: Callable[[], Array]) -> IKSolutions:
+        """Return the same solutions, whose distance is computed when it is first read, for it may take long.
+
+        Parameters
+        ----------
+        distance
+            Returns the distances, m, in an array of their shape.
+        """
+        solutions = object.__new__(type(self))
+        own = {name: value for name, value in self.__dict__.items() if name != "distance"}
+        object.__setattr__(solutions, "__dict__", {**own, "_later_distance": distance})
+        return solutions
+
     def __getattr__(self, name: str) -> Any:
-        """Return a field of :meth:`of_packed` that is read for the first time."""
+        """Return a field of :meth:`of_packed` or :meth:`with_later_distance` that is read for the first time."""
+        if name == "distance" and (later := self.__dict__.get("_later_distance")) is not None:
+            # Of two threads that read first, both get the same array.
+            return self.__dict__.setdefault(name, later())
         packed = self.__dict__.get("_packed")
         if packed is None or name not in ("distance", "valid", "flags", "status_code"):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
@@ -275,9 +291,9 @@ class IKSolutions:
         >>> len(solutions.windings("left up no-flip"))
         1
         """
-        if self.distance.shape != ():
+        if self.status_code.shape != ():
             raise ValueError(
-                f"windings of a batch of shape {self.distance.shape}; expected one pose"
+                f"windings of a batch of shape {self.status_code.shape}; expected one pose"
             )
         q = self.branch(branch)
         choices = [self._choices(i, float(q[i])) for i in range(len(q))]
@@ -316,14 +332,14 @@ class IKSolutions:
         return len(self.branches)
 
     def __repr__(self) -> str:
-        of = f"{counted(self.distance.size, 'pose')}, {counted(len(self), 'branch')}"
-        if self.distance.shape:
+        of = f"{counted(self.status_code.size, 'pose')}, {counted(len(self), 'branch')}"
+        if self.status_code.shape:
             counts = ", ".join(f"{count} {status.name}" for status, count in self._counts)
             return repr_line("IKSolutions", of, counts + self._doubt)
         return repr_line("IKSolutions", of, self._summary)
 
     def _repr_html_(self) -> str:
-        return self._batch_html() if self.distance.shape else self._pose_html()
+        return self._batch_html() if self.status_code.shape else self._pose_html()
 
     def _pose_html(self) -> str:
         """Return the branches of one pose: angles in degrees, lengths in m."""
@@ -363,7 +379,7 @@ class IKSolutions:
     def _batch_html(self) -> str:
         """Return the number of poses with each status, and the outcome of the first poses."""
         counts = [(status.name, str(count)) for status, count in self._counts]
-        first = list(islice(np.ndindex(self.distance.shape), _FIRST))
+        first = list(islice(np.ndindex(self.status_code.shape), _FIRST))
         rows = [
             (
                 str(place[0] if len(place) == 1 else place),
@@ -376,9 +392,9 @@ class IKSolutions:
         ]
         headings = ("pose", "status", "branches reached", "inside limits", "out of reach by [m]")
         return html_block(
-            f"{counted(self.distance.size, 'pose')}, {counted(len(self), 'branch')}: q of shape {self.q.shape}",
+            f"{counted(self.status_code.size, 'pose')}, {counted(len(self), 'branch')}: q of shape {self.q.shape}",
             html_table(("status", "poses"), counts, align="lr"),
-            html_table(headings, rows, align="llr", count=self.distance.size),
+            html_table(headings, rows, align="llr", count=self.status_code.size),
         )
 
     @property
@@ -405,7 +421,7 @@ class IKSolutions:
             limited = np.isfinite(self.lower) & np.isfinite(self.upper)
             q = (np.where(limited, self.lower, 0.0) + np.where(limited, self.upper, 0.0)) / 2
         near = joint_array(self.description, q, "joint values")
-        expected = (*self.distance.shape, self.q.shape[-1])
+        expected = (*self.status_code.shape, self.q.shape[-1])
         if near.shape[-1:] == expected[-1:] and near.ndim <= len(expected):
             with contextlib.suppress(ValueError):
                 return np.broadcast_to(near, expected)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, joint_array
 from dhkit.description.frames import configuration
@@ -85,6 +85,7 @@ def solve_in_closed_form(
     valid, flags = np.empty((2, *batch, B), dtype=np.uint8)
     status = np.empty(batch, dtype=np.uint8)
     count = poses.size // 16
+    later = None
     if count:
         rows = [
             q.reshape(count, B * n),
@@ -104,10 +105,9 @@ def solve_in_closed_form(
         if has_offset_wrist(fit) and not is_one_in_reach:
             beyond = np.flatnonzero(distance.reshape(count) > 0)
             if beyond.size:
-                distance.reshape(count)[beyond] = nearest_wrist_distance(
-                    fit, poses.reshape(count, 4, 4)[beyond]
-                )
-    return IKSolutions(
+                of_beyond = poses.reshape(count, 4, 4)[beyond]
+                later = partial(_corrected, fit, distance, beyond, of_beyond)
+    solutions = IKSolutions(
         q=q,
         valid=valid.view(np.bool_),
         flags=flags,
@@ -117,6 +117,13 @@ def solve_in_closed_form(
         met=fit.coordinates,
         description=description,
     )
+    return solutions if later is None else solutions.with_later_distance(later)
+
+
+def _corrected(fit: Fit, distance: Array, beyond: NDArray[np.intp], poses: Array) -> Array:
+    """Return distances (...), m, with those of poses (K, 4, 4) that are out of reach, at the indices ``beyond``."""
+    distance.reshape(-1)[beyond] = nearest_wrist_distance(fit, poses)
+    return distance
 
 
 def has_offset_wrist(fit: Fit) -> bool:
