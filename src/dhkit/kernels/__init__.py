@@ -1,6 +1,5 @@
 """Programs as batch functions: interpreted by CasADi's virtual machine, or compiled to SIMD blocks by LLVM."""
 
-from dhkit.kernels.background import Background
 from dhkit.kernels.batches import check_whole, fill, pose_rows, result_array
 from dhkit.kernels.elementary import EXACT_RANGE
 from dhkit.kernels.kernel import SMALL_BATCH, Kernel, kernel, kernel_mode, uncounted
@@ -10,7 +9,6 @@ from dhkit.kernels.threads import all_in_threads, in_threads
 __all__ = [
     "EXACT_RANGE",
     "SMALL_BATCH",
-    "Background",
     "FastCall",
     "Kernel",
     "SingleCall",

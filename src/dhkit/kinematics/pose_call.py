@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from dhkit.description import Array, Description, world_to_tool
-from dhkit.kernels import Background, FastCall, SingleCall, never
+from dhkit.kernels import FastCall, SingleCall, never
+from dhkit.kernels.background import Background
 from dhkit.kernels.call_source import MAX_ITEMS
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.eliminated import elimination_kernels

@@ -13,6 +13,7 @@ from dhkit.symbolic.differentiable.equation_frames import (
 )
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
 from dhkit.symbolic.differentiable.moments import Moments
+from dhkit.symbolic.differentiable.recursive import link_motions, transmitted_wrenches
 from dhkit.symbolic.differentiable.vectors import (
     ZERO_VECTOR,
     Scalar,
@@ -129,6 +130,157 @@ def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX)
     return _matrix(C)
 
 
+def composite_position_derivative(
+    table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX
+) -> casadi.SX:
+    """Return the derivatives of inverse dynamics with respect to the joint values, n x n.
+
+    With the acceleration A of a point at r minus gravity, tau_i is the integral of J_i . A over the mass that joint i
+    carries. A small motion of joint j moves the points that it carries by J_j, changes their acceleration by the second
+    derivative of J_j with respect to time, and turns the J_i of points that both carry. The sums over mass are those of
+    Singh, Russo & Wensing 2022 (Efficient analytical derivatives of rigid-body dynamics using spatial vector algebra),
+    here by integrals of V, r V^T and A.
+
+    Parameters
+    ----------
+    table
+        The arm's table in CasADi expressions.
+    q
+        Joint values, n x 1.
+    qd, qdd
+        Joint rates and accelerations, n x 1.
+
+    Returns
+    -------
+    casadi.SX
+        n x n, N m and N per unit of q; column j belongs to joint j.
+
+    Examples
+    --------
+    >>> import casadi
+    >>> from dhkit import Arm
+    >>> from dhkit.symbolic import InertialTable, joint_symbols
+    >>> table = InertialTable.of(Arm.load("planar2r"))
+    >>> q, qd, qdd = (joint_symbols(name, 2) for name in ("q", "qd", "qdd"))
+    >>> slopes = composite_position_derivative(table, q, qd, qdd)
+    >>> casadi.Function("slopes", [q, qd, qdd], [slopes])([0, 0.5], [1, 2], [0, 1]).full().round(4)
+    array([[-1.4109, -2.536 ],
+           [-1.4109, -1.2793]])
+    """
+    frames = equation_frames(table, q)
+    velocities = link_velocities(frames, qd)
+    motions = link_motions(frames, table.gravity, qd, qdd)
+    transmitted = transmitted_wrenches(frames, motions)
+    slopes: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
+    rates = _VelocityMoments.none()
+    for j, composite in _composites(frames):
+        frame = frames[j]
+        w, v = velocities[j]
+        rates = rates.joined(_VelocityMoments.of_link(frame.moments, w, v))
+
+        # Column j, i <= j: the wrench on the mass that joint j carries, which changes with q_j.
+        joint = _JointMotion(frame.prismatic, w, v, motions[j][0].column, motions[j][1])
+        column = joint.wrench_change(composite, rates, transmitted[j])
+        for i, (force, moment) in _wrench_at_each_joint(frames, j, column):
+            slopes[i][j] = (force if frames[i].prismatic else moment)[2]
+
+        # Row j, i < j: the torque of joint j, which changes with q_i.
+        couples = dict(_couple_at_each_joint(frames, j, rates.couple(frame.prismatic)))
+        row = _unit_acceleration_wrench(frame, composite)
+        for i, wrench in _wrench_at_each_joint(frames, j, row):
+            if i < j:
+                before = _JointMotion(
+                    frames[i].prismatic, *velocities[i], motions[i][0].column, motions[i][1]
+                )
+                slopes[j][i] = before.torque_change(wrench, couples[i])
+        rates = rates.about_previous(frame)
+    return _matrix(slopes)
+
+
+@dataclass(frozen=True)
+class _JointMotion:
+    """Motion of a joint's axis z and of its link, in the axes of the link's equations."""
+
+    prismatic: bool
+    w: Vector3
+    """Angular velocity of the link, rad/s."""
+    v: Vector3
+    """Velocity of the joint's origin, m/s."""
+    z_second: Vector3
+    """Second derivative of z with respect to time, 1/s^2."""
+    a: Vector3
+    """Acceleration of the joint's origin minus gravity, m/s^2."""
+
+    @property
+    def z_dot(self) -> Vector3:
+        """The derivative w x z of z with respect to time, 1/s."""
+        return self.w[1], -self.w[0], 0.0
+
+    def wrench_change(
+        self, body: Moments, rates: _VelocityMoments, transmitted: _Wrench
+    ) -> _Wrench:
+        """Return the change of the wrench on the mass that the joint carries, per unit of its joint value.
+
+        In it the axes of joints before it stay where they are.
+
+        Parameters
+        ----------
+        body, rates
+            Moments of that mass, and of its velocity.
+        transmitted
+            Its wrench: the integrals of A and of r x A.
+        """
+        force, moment = transmitted
+        turned_force = (-force[1], force[0], 0.0)
+        if self.prismatic:
+            # J_j = z, so the second derivative is z'', and the mass is moved by z: r x A changes by z x A.
+            return (
+                times(body.mass, self.z_second),
+                plus(cross(body.first, self.z_second), turned_force),
+            )
+
+        # J_j = z x r, so d2J_j/dt2 = z'' x r + 2 z' x (V - v) + z x (A - a). With p and G the integrals of V and r V^T:
+        #   force  = z'' x h + 2 z' x (p - m v) + z x (f - m a)
+        #   moment = J z'' + 2 (z' tr G - G^T z') - 2 h x (z' x v) + z x n - h x (z x a)
+        # The last two terms have the integral of r x (z x A) + (z x r) x A = z x (r x A), with n that of r x A.
+        z_dot = self.z_dot
+        h = body.first
+        relative = plus(rates.momentum, times(-body.mass, self.v))
+        z_a = (-self.a[1], self.a[0], 0.0)
+        two_z_dot = plus(z_dot, z_dot)
+        change = plus(cross(self.z_second, h), cross(two_z_dot, relative))
+        change = plus(change, plus(turned_force, times(-body.mass, z_a)))
+        turned = plus(_inertia_times(body, self.z_second), (-moment[1], moment[0], 0.0))
+        turned = plus(turned, rates.twice_about(two_z_dot))
+        shift = plus(cross(two_z_dot, self.v), z_a)
+        return change, plus(turned, times(-1.0, cross(h, shift)))
+
+    def torque_change(self, wrench: _Wrench, couple: Vector3) -> Scalar:
+        """Return the change of the torque of a later joint i per unit of this joint's value.
+
+        Parameters
+        ----------
+        wrench
+            The integrals of J_i and of r x J_i, r from this joint's origin.
+        couple
+            The integral of V x J_i.
+        """
+        force, moment = wrench
+        if self.prismatic:
+            return dot(self.z_second, force)
+
+        # The integral of (z x J_i) . A + J_i . d2J/dt2, in which A cancels:
+        #   z'' . moment + 2 z' . (couple - v x force) - z . (a x force)
+        about = plus(couple, times(-1.0, cross(self.v, force)))
+        x, y, _ = about
+        by_rate = self.w[1] * x - self.w[0] * y
+        return (
+            dot(self.z_second, moment)
+            + (by_rate + by_rate)
+            - (self.a[0] * force[1] - self.a[1] * force[0])
+        )
+
+
 @dataclass(frozen=True)
 class _VelocityMoments:
     """Integrals of V and of r V^T over the mass of some links; V is velocity, r position from a joint's origin."""
@@ -165,6 +317,16 @@ class _VelocityMoments:
             return self.momentum[1], -self.momentum[0], 0.0
         # V x (z x r) = z (V . r) - r (V . z); its z component is V_x r_x + V_y r_y.
         return -self.G[0][2], -self.G[1][2], self.G[0][0] + self.G[1][1]
+
+    def twice_about(self, two_z: Vector3) -> Vector3:
+        """Return the integral of r x (z x V) over the mass, twice, for 2 z with the z component 0."""
+        # z (r . V) - V (r . z)
+        x, y, _ = two_z
+        G = self.G
+        trace = G[0][0] + G[1][1] + G[2][2]
+        rows = (G[0][k] * x + G[1][k] * y for k in range(3))
+        a, b, c = rows
+        return trace * x - a, trace * y - b, -c
 
     def about_previous(self, frame: EquationFrame) -> _VelocityMoments:
         """Return the integrals about the previous joint's origin, in the axes of its link's equations."""
@@ -255,12 +417,12 @@ def _row_rate(
 
 
 def _inertia_times(body: Moments, w: Vector3) -> Vector3:
-    """Return J w for a w whose z component is 0; J = tr(S) 1 - S."""
-    x, y, _ = w
+    """Return J w; J = tr(S) 1 - S."""
+    x, y, z = w
     return (
-        (body.yy + body.zz) * x - body.xy * y,
-        (body.xx + body.zz) * y - body.xy * x,
-        -(body.xz * x) - body.yz * y,
+        (body.yy + body.zz) * x - body.xy * y - body.xz * z,
+        (body.xx + body.zz) * y - body.xy * x - body.yz * z,
+        (body.xx + body.yy) * z - body.xz * x - body.yz * y,
     )
 
 

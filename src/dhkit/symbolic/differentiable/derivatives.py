@@ -1,4 +1,4 @@
-"""Derivatives of inverse and forward dynamics with respect to the state, by CasADi's algorithmic differentiation."""
+"""Derivatives of inverse and forward dynamics with respect to the state, by composite bodies."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from dhkit.symbolic.differentiable.composite_bodies import (
     composite_coriolis_matrix,
     composite_mass_matrix,
+    composite_position_derivative,
 )
 from dhkit.symbolic.differentiable.forward_dynamics import (
     recursive_forward_dynamics,
     solve_for_acceleration,
 )
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
-from dhkit.symbolic.differentiable.recursive import recursive_inverse_dynamics
 
 if TYPE_CHECKING:
     import casadi
@@ -52,7 +52,7 @@ def recursive_inverse_dynamics_derivatives(
     """
     import casadi
 
-    by_position = casadi.jacobian(recursive_inverse_dynamics(table, q, qd, qdd), q)
+    by_position = composite_position_derivative(table, q, qd, qdd)
     by_rate = 2 * composite_coriolis_matrix(table, q, qd)
     return casadi.vertcat(by_position, by_rate, composite_mass_matrix(table, q))
 
@@ -149,7 +149,7 @@ def recursive_forward_dynamics_derivatives(
 
     n = q.shape[0]
     qdd = casadi.SX.sym("qdd", n)
-    by_position = casadi.jacobian(recursive_inverse_dynamics(table, q, qd, qdd), q)
+    by_position = composite_position_derivative(table, q, qd, qdd)
     at_qdd = casadi.substitute(by_position, qdd, recursive_forward_dynamics(table, q, qd, tau))
     by_rate = 2 * composite_coriolis_matrix(table, q, qd)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _AngularMotion:
+class AngularMotion:
     """A link's angular velocity w, rad/s, and the matrix U = [wd]x + [w]x [w]x of its angular acceleration wd, rad/s^2.
 
     A point at r from the link's origin accelerates by U r relative to it. Stored are w, wd_z and the last column of U,
@@ -58,7 +58,7 @@ class _AngularMotion:
         a, b, c = (row[0] * r[0] + row[1] * r[1] + row[2] * r[2] for row in self.U)
         return a, b, c
 
-    def in_twisted_axes(self, frame: EquationFrame) -> _AngularMotion:
+    def in_twisted_axes(self, frame: EquationFrame) -> AngularMotion:
         """Return the same motion in the twisted axes of the next joint."""
         c = frame.cos_alpha
         s = frame.sin_alpha
@@ -67,18 +67,16 @@ class _AngularMotion:
         # The new z axis is (0, -s, c) in the old axes: wd_z' = c wd_z - s wd_y, and the last column of U' is U z'.
         wd_z = c * self.wd_z - s * self.wd_y
         column = self.times((0.0, -s, c))
-        return _AngularMotion(w, wd_z, frame.to_twisted(column))
+        return AngularMotion(w, wd_z, frame.to_twisted(column))
 
-    def with_joint_motion(self, qd: Scalar, qdd: Scalar) -> _AngularMotion:
+    def with_joint_motion(self, qd: Scalar, qdd: Scalar) -> AngularMotion:
         """Return the motion with that of a revolute joint about z added: rates rad/s and rad/s^2."""
         x, y, z = self.w
-        return _AngularMotion((x, y, z + qd), self.wd_z + qdd, self.column)
+        return AngularMotion((x, y, z + qd), self.wd_z + qdd, self.column)
 
-    def in_link_axes(self, frame: EquationFrame) -> _AngularMotion:
+    def in_link_axes(self, frame: EquationFrame) -> AngularMotion:
         """Return the same motion, given in twisted axes, in the axes of the link's equations."""
-        return _AngularMotion(
-            frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column)
-        )
+        return AngularMotion(frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column))
 
     def moment(self, link: Moments) -> Vector3:
         """Return the integral of r x U r over a link's mass, N m: the moment that its rotation needs."""
@@ -138,12 +136,38 @@ def recursive_inverse_dynamics(
     import casadi
 
     frames = equation_frames(table, q)
+    wrenches = transmitted_wrenches(frames, link_motions(frames, table.gravity, qd, qdd))
+    tau = []
+    for i, (frame, (force, moment)) in enumerate(zip(frames, wrenches, strict=True)):
+        tau.append((force if frame.prismatic else moment)[2] + table.armature[i] * qdd[i])
+    for i, j, inertia in table.couplings:
+        tau[i] = tau[i] + inertia * qdd[j]
+        tau[j] = tau[j] + inertia * qdd[i]
+    return casadi.SX(casadi.vertcat(*tau))
 
-    # From the base to the last link: a is the acceleration of each joint's origin minus gravity.
-    motion = _AngularMotion(ZERO_VECTOR, 0.0, ZERO_VECTOR)
-    a = times(-1.0, table.gravity)
-    link_forces: list[Vector3] = []
-    link_moments: list[Vector3] = []
+
+def link_motions(
+    frames: Sequence[EquationFrame],
+    gravity: Vector3,
+    qd: Sequence[Scalar] | casadi.SX,
+    qdd: Sequence[Scalar] | casadi.SX,
+) -> list[tuple[AngularMotion, Vector3]]:
+    """Return each link's angular motion, and the acceleration of its joint's origin, m/s^2, minus gravity.
+
+    Vectors are in the axes of the links' equations.
+
+    Parameters
+    ----------
+    frames
+        The equation frames of all joints.
+    gravity
+        In frame 0, m/s^2.
+    qd, qdd
+        Joint rates and accelerations, n x 1.
+    """
+    motion = AngularMotion(ZERO_VECTOR, 0.0, ZERO_VECTOR)
+    a = times(-1.0, gravity)
+    motions = []
     for i, frame in enumerate(frames):
         # a_i = a_(i-1) + U_(i-1) lever, and for a prismatic joint 2 w x z qd + z qdd
         a = frame.to_twisted(plus(a, motion.times(frame.lever)))
@@ -155,30 +179,38 @@ def recursive_inverse_dynamics(
             motion = motion.with_joint_motion(qd[i], qdd[i])
         a = frame.from_twisted(a)
         motion = motion.in_link_axes(frame)
+        motions.append((motion, a))
+    return motions
 
-        # Newton: F = m a + U h. Euler about the joint's origin: N = integral of r x U r + h x a. h is the first moment.
-        link = frame.moments
-        link_forces.append(plus(times(link.mass, a), motion.times(link.first)))
-        link_moments.append(plus(motion.moment(link), cross(link.first, a)))
 
-    # From the last link to the base: force f and moment n that joint i transmits, and their components along z.
+def transmitted_wrenches(
+    frames: Sequence[EquationFrame], motions: Sequence[tuple[AngularMotion, Vector3]]
+) -> list[tuple[Vector3, Vector3]]:
+    """Return the force, N, and the moment about its origin, N m, that each joint transmits.
+
+    Vectors are in the axes of the links' equations.
+
+    Parameters
+    ----------
+    frames
+        The equation frames of all joints.
+    motions
+        Of :func:`link_motions`.
+    """
     f = ZERO_VECTOR
     n = ZERO_VECTOR
-    tau = [0.0] * table.n
-    for i in reversed(range(table.n)):
-        frame = frames[i]
-        f = plus(link_forces[i], f)
-        n = plus(link_moments[i], n)
-        tau[i] = (f if frame.prismatic else n)[2] + table.armature[i] * qdd[i]
+    wrenches = []
+    for frame, (motion, a) in zip(reversed(frames), reversed(motions), strict=True):
+        # Newton: F = m a + U h. Euler about the joint's origin: N = integral of r x U r + h x a. h is the first moment.
+        link = frame.moments
+        f = plus(plus(times(link.mass, a), motion.times(link.first)), f)
+        n = plus(plus(motion.moment(link), cross(link.first, a)), n)
+        wrenches.append((f, n))
 
         f = frame.to_previous(f)
         n = frame.to_previous(n)
         n = plus(n, cross(frame.lever, f))
-
-    for i, j, inertia in table.couplings:
-        tau[i] = tau[i] + inertia * qdd[j]
-        tau[j] = tau[j] + inertia * qdd[i]
-    return casadi.SX(casadi.vertcat(*tau))
+    return wrenches[::-1]
 
 
 def recursive_bias(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
