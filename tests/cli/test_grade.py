@@ -37,6 +37,9 @@ class FakeJudge:
             raise AnswerError(f"{path}: no TOML: line 1")
         return RIGHT if text == "right" else replace(REPORT, sheet=None, student="")
 
+    def completed(self, report):
+        return report
+
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):

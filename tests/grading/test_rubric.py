@@ -1,7 +1,7 @@
 """Rubrics: what is refused, what answers are worth by them, and what of a report is told."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import pytest
 from hypothesis import given, strategies as st
@@ -9,6 +9,7 @@ from hypothesis import given, strategies as st
 from dhkit.description import library_robot
 from dhkit.errors import AnswerError
 from dhkit.grading import grade_answers
+from dhkit.grading.answers.sheet import RUBRIC_KEYS, read_task
 from dhkit.grading.grade_report import Diagnosis, GradeReport, Verdict
 from dhkit.grading.marks import marks
 from dhkit.grading.reports import with_feedback
@@ -196,6 +197,10 @@ def test_what_is_right_throughout_gets_all_points_exactly(report, points):
         ("[weights]\nM12 = 1\nM_12 = 0", "weights: M_12 is there twice, as M12"),
         ("weights = 3", "weights: found 3; expected a table"),
         ("[weights]\nM = -1", "weights.M: found -1; expected greater than or equal to 0"),
+        (
+            "[rubric.late]\nper_day = 1",
+            "unknown key 'rubric'; expected its keys at the top: [late]",
+        ),
         ("points = ", "no TOML: "),
         ("notes = '" + 100_000 * "x" + "'", "more than 0.1 MB; expected a rubric"),
     ],
@@ -207,6 +212,26 @@ def test_what_is_refused_is_said_in_one_line(tmp_path, text, complaint):
         Rubric.read(path)
     assert str(error.value).startswith(f"{path}: {complaint}")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("[late]\nper_day = 0.1", "unknown key 'late'; it belongs to the rubric: expected it in [rubric.late]"),
+        ("points = 5", "unknown key 'points'; it belongs to the rubric: expected it in [rubric]"),
+        ("[task]\nlate = {}", "unknown key task.'late'; it belongs to the rubric: expected it in [rubric.late]"),
+    ],
+)  # fmt: skip
+def test_a_key_of_the_rubric_beside_its_table_in_a_task_is_told_its_place(tmp_path, text, line):
+    path = tmp_path / "task.toml"
+    path.write_text(text)
+    with pytest.raises(AnswerError) as error:
+        read_task(path)
+    assert str(error.value) == f"{path}: {line}"
+
+
+def test_keys_of_the_rubric_are_its_fields():
+    assert set(RUBRIC_KEYS) == {field.name for field in fields(Rubric)}
 
 
 def test_a_share_for_no_mistake_is_refused():

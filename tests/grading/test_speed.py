@@ -11,7 +11,7 @@ from dhkit.description import library_robot
 from dhkit.grading import grade_answers
 from dhkit.grading.judging import truth as truths
 from dhkit.grading.judging.truth import truth_of
-from dhkit.grading.mistakes.diagnosis import variants_of
+from dhkit.grading.mistakes.diagnosis import _mistakes_of, variants_of
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.textbook import _motion, _places, derive
 from grading_answers import SHEETS, written
@@ -22,7 +22,7 @@ DYNAMICS = ("M", "C", "g", "tau")
 
 
 def forget():
-    for cache in (truths.truth_of, variants_of, _motion, _places):
+    for cache in (truths.truth_of, variants_of, _mistakes_of, _motion, _places):
         cache.cache_clear()
 
 

@@ -109,10 +109,31 @@ def test_rows_as_json(folder, capsys):
     assert json.loads(printed.splitlines()[-1])["error"].startswith("not read")
 
 
-def test_options_of_a_class_are_refused_for_one_program(folder, capsys):
+def test_the_last_the_best_or_all_programs_of_a_student_count(folder, capsys):
+    texts = {"ada_9_1_a.py": "RIGHT", "ada_9_2_a-1.py": "RIGHT" + FORGOTTEN}
+    lengths = Arm.load("planar2r").description.parameters
+    right = RIGHT.replace("L1", lengths["l1"].text).replace("L2", lengths["l2"].text)
+    shutil.rmtree("files")
+    for name, text in texts.items():
+        path = folder / "files" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text.replace("RIGHT", right))
+    shutil.make_archive("class", "zip", "files")
+    counting = {}
+    for keep in ("last", "best", "all"):
+        check(capsys, "--keep", keep, "-o", keep)
+        rows = csv.DictReader((folder / keep / "marks.csv").read_text("utf-8").splitlines())
+        counting[keep] = [row["points"] for row in rows]
+    assert counting == {"last": ["0"], "best": ["100"], "all": ["100", "0"]}
+    assert len(list((folder / "best" / "records").iterdir())) == 2
+    assert check(capsys)[1] == check(capsys, "--keep", "last")[1]
+
+
+@pytest.mark.parametrize("options", [("-o", "out"), ("--keep", "best"), ("--export", "canvas")])
+def test_options_of_a_class_are_refused_for_one_program(folder, capsys, options):
     path = next(folder.rglob("fk.py"))
     with pytest.raises(SystemExit) as exit:
-        main(["check", "planar2r", str(path), "-o", "out"])
+        main(["check", "planar2r", str(path), *options])
     assert exit.value.code == 2
     assert "are for the programs of a class" in capsys.readouterr().err
 

@@ -22,7 +22,13 @@ from dhkit.errors import AnswerError, DescriptionError
 from dhkit.execution import Limits
 from dhkit.grading.batch import content_digest, judgement_key, origin_of_sheet
 from dhkit.grading.bounds import BOUNDS
-from dhkit.grading.exports import ExportKind, last_attempts, opened_submissions
+from dhkit.grading.exports import (
+    ExportKind,
+    Keep,
+    are_best,
+    last_attempts,
+    opened_submissions,
+)
 from dhkit.grading.reports.sentences import points
 from dhkit.grading.sheet_judge import package_version
 from dhkit.grading.sheets import Sheet
@@ -49,6 +55,7 @@ def check_folder(
     samples: int,
     seconds: float,
     export: ExportKind | None,
+    keep: Keep = Keep.LAST,
     jobs: int | None,
     output: Path | None,
     json: bool,
@@ -67,6 +74,8 @@ def check_folder(
         As for a single program; each program's seed follows from the seed and its content.
     export
         Layout of the folder; recognized unless given.
+    keep
+        Which of a student's programs counts. All that are scored have a record, and those that count a row.
     jobs
         Number of programs at a time; by default one for each core.
     output
@@ -88,7 +97,9 @@ def check_folder(
     with opened_submissions([folder], export, own_files, PROGRAM_SUFFIXES) as submissions:
         for note in submissions.notes:
             sys.stderr.write(f"dhkit: {note}\n")
-        sheets = last_attempts(submissions.sheets)
+        sheets = list(submissions.sheets)
+        if keep is Keep.LAST:
+            sheets = last_attempts(sheets)
         hidden = [*own_files, folder, *submissions.folders]
         isolation = isolation_for("the class's programs", True, hidden)
         rules = [
@@ -136,14 +147,18 @@ def check_folder(
                     sys.stderr.write(f"dhkit: stopped; the same command goes on with {output}\n")
                 raise
         ordered = [rows[origin_of_sheet(sheet)] for sheet in sheets]
+    counting = ordered
+    if keep is Keep.BEST:
+        best = are_best([row.student for row in ordered], [row.points for row in ordered])
+        counting = [row for row, is_best in zip(ordered, best, strict=True) if is_best]
     if output is not None:
-        write_atomically(output / MARKS, check_csv(ordered))
-        write_atomically(output / "class.html", check_page(ordered, arm.name, MARKS))
+        write_atomically(output / MARKS, check_csv(counting))
+        write_atomically(output / "class.html", check_page(counting, arm.name, MARKS))
     if json:
-        for row in ordered:
+        for row in counting:
             sys.stdout.write(row.to_json() + "\n")
     else:
-        _print(ordered)
+        _print(counting)
         if output is not None:
             say(f"wrote {output}")
     if any(row.error for row in ordered):

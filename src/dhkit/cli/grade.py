@@ -27,6 +27,7 @@ from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading import LIBRARY
 from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.answers.sheet_values import AnswerSheet
+from dhkit.grading.answers.sources import SHEET_SUFFIXES
 from dhkit.grading.archives import is_archive, unpacked
 from dhkit.grading.batch import (
     content_digest,
@@ -55,6 +56,8 @@ from dhkit.grading.variants import VariantKey
 from dhkit.grading.variants.students import read_students
 from dhkit.lab.assignment import Assignment, is_assignment
 from dhkit.lab.marks import LabMark, find_records, lab_marks, lab_marks_csv
+from dhkit.lab.record import SUFFIX
+from dhkit.lab.record_judge import RecordJudge
 
 app = typer.Typer(rich_markup_mode=None)
 PRINTED = Delivery()
@@ -77,6 +80,13 @@ def grade(
         typer.Option(
             help="The instructor's file: robot, [task], [names], [rubric]; or a lab's assignment (.toml); or the key "
             "of a task's variants, a folder."
+        ),
+    ] = None,
+    lab: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="ASSIGNMENT",
+            help="A lab's assignment (.toml), whose records (.lab.json) lie among the sheets of the class.",
         ),
     ] = None,
     rubric: Annotated[
@@ -195,6 +205,7 @@ def grade(
         key=key,
         export=export,
         students=students,
+        lab=lab,
     )
 
 
@@ -356,6 +367,7 @@ def grade_files(
     key: VariantKey | None = None,
     export: ExportKind | None = None,
     students: Path | None = None,
+    lab: Path | None = None,
 ) -> ExitStatus:
     """Judge sheets about their own robots, all about one robot, or each about its student's variant.
 
@@ -383,6 +395,8 @@ def grade_files(
         Layout of the folders and archives; recognized unless given.
     students
         List of students, whose ids count instead of an export's names.
+    lab
+        A lab's assignment, whose records are judged among the sheets.
 
     Raises
     ------
@@ -417,7 +431,12 @@ def grade_files(
     listed = None if students is None else read_students(students)
     if students is not None:
         own_files.append(students)
-    with opened_submissions(sheets, export, own_files) as submissions:
+    others = {}
+    if lab is not None:
+        others[SUFFIX] = record_judge(lab)
+        own_files.append(lab)
+    suffixes = (*SHEET_SUFFIXES, *others)
+    with opened_submissions(sheets, export, own_files, suffixes) as submissions:
         _say_notes(submissions.notes)
         _say_notes(_late_notes(submissions.sheets, chosen))
         if listed is not None:
@@ -441,6 +460,7 @@ def grade_files(
             has_own_seeds=are_several,
             key=key,
             students={} if key is None else _students(submissions.sheets, key),
+            others=others,
         )
         rules = [
             package_version(),
@@ -451,6 +471,10 @@ def grade_files(
         ]
 
         def key_of(sheet: Sheet) -> str:
+            if (other := judge.other_for(sheet.path)) is not None:
+                # The name that was typed in the lab is compared with all by which the class knows the student.
+                names = [*sheet.aliases, "listed as", *sheet.listed]
+                return judgement_key(sheet, [package_version(), other.digest, *names])
             try:
                 subject = judge.robot_of(sheet.path)
             except AnswerError:
@@ -460,6 +484,20 @@ def grade_files(
         if are_several and place.scheduler is None:
             judge.prepare()
         return run(submissions, judge, delivery, place=place, seconds=seconds, key_of=key_of)
+
+
+def record_judge(path: Path) -> RecordJudge:
+    """Return the judge of the records of a lab's assignment.
+
+    Raises
+    ------
+    DescriptionError
+        The file is not an assignment, or one without goals.
+    """
+    assignment = Assignment.read(path)
+    if not assignment.places:
+        raise DescriptionError(f"{path}: an assignment without goals; expected points to be given")
+    return RecordJudge(assignment)
 
 
 def _late_notes(sheets: Sequence[Sheet], rubric: Rubric) -> Iterator[str]:
@@ -573,7 +611,8 @@ def run(
     reports = []
     for sheet in sheets:
         origin = origin_of_sheet(sheet)
-        reports.append(taken[origin] if origin in taken else next(new))
+        report = taken[origin] if origin in taken else next(new)
+        reports.append(judge.completed(report))
     delivery(reports, judge.rubric, several, records)
     return _status(reports)
 

@@ -6,6 +6,7 @@ import io
 import json as jsons
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast, get_args
@@ -21,10 +22,11 @@ from dhkit.cli.grade_folder import (
 )
 from dhkit.cli.output import console, say
 from dhkit.description import write_atomically
-from dhkit.description.files import check_place
+from dhkit.description.files import check_place, read_bounded
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
-from dhkit.grading.exports import Keep
+from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.exports import Keep, are_best
 from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks, marks
 from dhkit.grading.reports import (
@@ -36,12 +38,16 @@ from dhkit.grading.reports import (
     marks_csv,
     terminal_class,
     terminal_report,
+    totals_csv,
     with_feedback,
 )
+from dhkit.grading.reports.marks_csv import TOTALS_COLUMNS
 from dhkit.grading.reports.sentences import fault_of
 from dhkit.grading.rubric import Feedback, Rubric
+from dhkit.lab.record import SUFFIX
 
 FORMS = ("text", "json", "gradescope", "junit", "html")
+TOTALS = "totals.csv"
 FILE_WIDTH = 120
 """Width of text in a file, columns."""
 
@@ -98,7 +104,7 @@ class Delivery:
         output = self.output
         if output is None or output.is_dir():
             return
-        if output.suffix.lower() in SHEET_SUFFIXES:
+        if output.name.lower().endswith((*SHEET_SUFFIXES, SUFFIX)):
             raise AnswerError(
                 f"{output}: a report would overwrite an answer sheet; expected another name"
             )
@@ -138,7 +144,11 @@ class Delivery:
             Records of a run that can be continued.
         """
         judged = [Graded(report, marks(report, rubric)) for report in reports]
-        counts = are_best(judged) if self.keep is Keep.BEST else [True] * len(judged)
+        counts = [True] * len(judged)
+        if self.keep is Keep.BEST:
+            # Sheets and lab records are compared among themselves.
+            owners = [(record_student(one.report), one.report.is_lab_record) for one in judged]
+            counts = are_best(owners, [one.marks.points for one in judged])
         level = cast("Feedback", self.feedback or rubric.feedback)
         form = self.form
         output = self.output
@@ -159,17 +169,6 @@ class Delivery:
             sys.stdout.write(_document(shown, form, level, several))
         if output is not None and form != "json":
             say(f"wrote {output}")
-
-
-def are_best(graded: Sequence[Graded]) -> list[bool]:
-    """Return for each report whether it is its student's with the most points; of equal ones the last is."""
-    best: dict[str, int] = {}
-    for number, one in enumerate(graded):
-        student = record_student(one.report)
-        if student not in best or one.marks.points >= graded[best[student]].marks.points:
-            best[student] = number
-    counting = set(best.values())
-    return [number in counting for number in range(len(graded))]
 
 
 def _is_folder(output: Path, form: str, several: bool) -> bool:
@@ -229,6 +228,8 @@ def _write_folder(
 ) -> None:
     """Write the files of a class: marks, a page and full records for the teacher, and a page for each student.
 
+    With lab records a student may have several rows that count: a table of totals has their sums.
+
     Results of an earlier run in the folder are removed.
 
     Parameters
@@ -255,8 +256,23 @@ def _write_folder(
             continue
         counting.append(whole)
         write_atomically(page, html_report(one.report, one.marks))
-    write_atomically(folder / MARKS, marks_csv(*_columns(counting)))
-    write_atomically(folder / "class.html", html_class(*_columns(counting), table=MARKS))
+    columns = _columns(counting)
+    write_atomically(folder / MARKS, marks_csv(*columns))
+    has_parts = any(one.report.is_lab_record for one in counting)
+    if has_parts:
+        write_atomically(folder / TOTALS, totals_csv(*columns))
+    else:
+        _remove_totals(folder / TOTALS)
+    overview = html_class(*columns, table=MARKS, totals=TOTALS if has_parts else "")
+    write_atomically(folder / "class.html", overview)
+
+
+def _remove_totals(path: Path) -> None:
+    """Remove the totals of an earlier run; a file that is not a table of totals stays."""
+    with suppress(DescriptionError):
+        content = read_bounded(path, BOUNDS.report_file_bytes, "totals")
+        if content.startswith(f"{','.join(TOTALS_COLUMNS)}\n".encode()):
+            path.unlink()
 
 
 def record_student(report: GradeReport) -> str:

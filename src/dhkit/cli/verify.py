@@ -20,7 +20,7 @@ from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
 from dhkit.grading.archives import is_archive
-from dhkit.grading.exports import ExportKind
+from dhkit.grading.exports import ExportKind, Keep
 from dhkit.programs import (
     CheckRubric,
     Limits,
@@ -127,6 +127,12 @@ def check(
         ExportKind | None,
         typer.Option(help="Layout of a class's folder; default: recognized by its names."),
     ] = None,
+    keep: Annotated[
+        Keep | None,
+        typer.Option(
+            help="Which of a student's programs counts; default: the last where the export tells their order."
+        ),
+    ] = None,
     jobs: Annotated[
         int | None,
         typer.Option(min=1, max=1024, help="Number of a class's programs that run at a time."),
@@ -159,12 +165,15 @@ def check(
             samples=samples,
             seconds=seconds,
             export=export,
+            keep=keep or Keep.LAST,
             jobs=jobs,
             output=output,
             json=json,
         )
-    if export is not None or output is not None:
-        raise DescriptionError("--export and --output are for the programs of a class, a folder")
+    if export is not None or keep is not None or output is not None:
+        raise DescriptionError(
+            "--export, --keep and --output are for the programs of a class, a folder"
+        )
     points = None if rubric is None else CheckRubric.read(rubric)
     place = isolation_for(Path(program[0]).name, isolated, [] if rubric is None else [rubric])
     with Program(source, Limits(seconds=seconds), place) as loaded:

@@ -20,8 +20,10 @@ from dhkit.errors import DhkitError
 from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.isolation import Worker, WorkerLimits, is_late, start_worker
+from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
+from dhkit.grading.variants.students import is_name_of
 
 GIGABYTE = 1024**3
 
@@ -340,7 +342,16 @@ def with_origin(report: GradeReport, sheet: Sheet, seconds: float) -> GradeRepor
         handed_in="" if sheet.time is None else sheet.time.isoformat(),
         seconds=report.seconds or seconds,
         left_out=(*report.left_out, *(f"not read: {_printable(name)}" for name in sheet.beside)),
+        notes=tuple(note for note in report.notes if not _is_own_signature(note, sheet)),
     )
+
+
+def _is_own_signature(note: Note, sheet: Sheet) -> bool:
+    """Return whether a note says that the sheet bears a name which is the student's; a single file has no other."""
+    if note.kind is not NoteKind.SIGNED:
+        return False
+    names = (sheet.student, *sheet.aliases, *sheet.listed)
+    return not sheet.student or is_name_of(note.values[0], names)
 
 
 def _printable(name: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
@@ -14,7 +14,12 @@ from dhkit.execution import find_isolation
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
-from dhkit.grading.answers.sources import SHEET_SUFFIXES, executed_source, read_source
+from dhkit.grading.answers.sources import (
+    SHEET_SUFFIXES,
+    executed_source,
+    import_readers,
+    read_source,
+)
 from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.judging.truth import truth_of
@@ -257,7 +262,11 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     return read_robot(path)
 
 
-def prepare(description: Description | None, report: GradeReport | None = None) -> None:
+def prepare(
+    description: Description | None,
+    report: GradeReport | None = None,
+    task: AnswerSheet | None = None,
+) -> None:
     """Import modules and derive equations that the next sheets need, so that processes forked from this one inherit it.
 
     Parameters
@@ -268,11 +277,14 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         Report of a judged sheet: the mistakes of its quantities are derived, for arms of up to
         :data:`MAX_PREPARED_JOINTS` joints. Without a report the libraries are imported and the robot's equations
         derived.
+    task
+        The task of all sheets.
     """
     if report is None:
         judge_sheet(
             description or library_robot("planar2r"), sheet_of({"answer": {"A1": _IDENTITY}})
         )
+        import_readers()
         import mpmath  # noqa: F401
         import scipy.optimize  # noqa: F401
 
@@ -281,8 +293,29 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         if report.robot not in robots():
             return
         description = library_robot(report.robot)
-    if description.n > MAX_PREPARED_JOINTS or report.digest != description.digest:
+    if report.digest == description.digest:
+        prepare_mistakes(description, report.quantities, task)
+
+
+def prepare_mistakes(
+    description: Description, quantities: Iterable[str], task: AnswerSheet | None = None
+) -> None:
+    """Derive all mistakes in some quantities of an arm; arms that differ in numbers of parameters alone share them.
+
+    Parameters
+    ----------
+    description
+        The arm; nothing is derived for one of more than :data:`MAX_PREPARED_JOINTS` joints.
+    quantities
+        Names of quantities; those without mistakes, such as tables, are passed over.
+    task
+        The task, which says in which coordinates answers are.
+    """
+    if description.n > MAX_PREPARED_JOINTS:
         return
-    for quantity in report.quantities:
+    is_absolute = task is not None and task.names.absolute
+    friction = task is not None and task.task.friction
+    variants = variants_of(truth_of(description, is_absolute, friction), frozenset())
+    for quantity in quantities:
         if quantity in quantity_names(description.n):
-            variants_of(truth_of(description), frozenset()).prepare(quantity)
+            variants.prepare(quantity)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -195,6 +195,29 @@ def last_attempts(sheets: Sequence[Sheet]) -> list[Sheet]:
     return [sheet for sheet in sheets if sheet.attempt == last[sheet.student, sheet.series]]
 
 
+def are_best(owners: Sequence[Hashable], points: Sequence[float]) -> list[bool]:
+    """Return for each submission whether it is its owner's with the most points; of equal ones the last is.
+
+    Parameters
+    ----------
+    owners
+        For each submission a value that is equal for those of which one counts.
+    points
+        Points of each.
+
+    Examples
+    --------
+    >>> are_best(["ada", "bob", "ada", "ada"], [5, 3, 8, 7])
+    [False, True, True, False]
+    """
+    best: dict[Hashable, int] = {}
+    for number, owner in enumerate(owners):
+        if owner not in best or points[number] >= points[best[owner]]:
+            best[owner] = number
+    counting = set(best.values())
+    return [number in counting for number in range(len(owners))]
+
+
 def with_ids(sheets: Sequence[Sheet], students: Students) -> tuple[list[Sheet], list[str]]:
     """Return the sheets of an export with the ids of a list of students instead of the platform's names.
 
@@ -216,10 +239,13 @@ def with_ids(sheets: Sequence[Sheet], students: Students) -> tuple[list[Sheet], 
     # Two students of the platform who have one name cannot both be the one of the list.
     claims = Counter(ids.values())
     unknown = [name for name, student in ids.items() if not student or claims[student] > 1]
-    named = [
-        sheet if sheet.student in unknown else replace(sheet, student=ids[sheet.student])
-        for sheet in sheets
-    ]
+    rows = dict(zip(students.ids, students.rows, strict=True))
+    named = []
+    for sheet in sheets:
+        if sheet.student not in unknown:
+            student = ids[sheet.student]
+            sheet = replace(sheet, student=student, listed=rows[student])
+        named.append(sheet)
     return named, unknown
 
 

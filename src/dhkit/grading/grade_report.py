@@ -27,6 +27,7 @@ class Verdict(Enum):
     CORRECT = "correct"
     ROUNDED = "correct within rounding"
     SAMPLED = "agrees at sampled states"
+    RECORDED = "taken from the record"
     UNDECIDED = "undecided"
     INCOMPLETE = "incomplete"
     WRONG = "wrong"
@@ -40,11 +41,11 @@ class Verdict(Enum):
     @property
     def is_proved(self) -> bool:
         """Whether a verdict that passes was proved: correct, or correct within rounding."""
-        return self not in (Verdict.SAMPLED, Verdict.UNDECIDED)
+        return self not in (Verdict.SAMPLED, Verdict.RECORDED, Verdict.UNDECIDED)
 
     @property
     def passes(self) -> bool:
-        """Whether the entry is correct, sampled or undecided: no error was found."""
+        """Whether the entry is correct, sampled, taken from a record or undecided: no error was found."""
         return self.severity <= Verdict.UNDECIDED.severity
 
 
@@ -81,7 +82,7 @@ class Entry:
     Attributes
     ----------
     quantity
-        M, C, h, g, tau, K, V, L, A1 ... An, T, J, dh or ik.
+        M, C, h, g, tau, K, V, L, A1 ... An, T, J, dh or ik; of a lab's record a goal, such as goal1.2.
     index
         Indices of the entry in the quantity, from 0; empty for a scalar such as K.
     verdict
@@ -272,6 +273,9 @@ class GradeReport:
         Whether the sheet itself names the robot that it was judged by.
     handed_in
         When the sheet was handed in: ISO 8601 with a zone; empty if nothing says it.
+    goals
+        Points of each goal of a lab's assignment, by the name of its entry, if the report is about a record of work on
+        it; empty for a sheet, whose points the rubric gives.
 
     Examples
     --------
@@ -297,6 +301,7 @@ class GradeReport:
     proof_required: bool = False
     own_robot: bool = False
     handed_in: Annotated[str, AfterValidator(_time_or_empty)] = ""
+    goals: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Verdict:
@@ -310,6 +315,11 @@ class GradeReport:
     @property
     def _lacks_proof(self) -> bool:
         return self.proof_required and not self.verdict.is_proved
+
+    @property
+    def is_lab_record(self) -> bool:
+        """Whether the report is about the record of work on a lab's assignment."""
+        return bool(self.goals)
 
     @property
     def conclusion(self) -> str:

@@ -85,7 +85,7 @@ class Marks:
 
 
 def marks(report: GradeReport, rubric: Rubric) -> Marks:
-    """Return the points of a judged sheet; a sheet that could not be judged gets 0.
+    """Return the points of a judged sheet, or of a lab's record; one that could not be judged gets 0.
 
     Sums are exact until they become floats, so that a sheet without errors gets all points and not nearly all.
 
@@ -94,7 +94,7 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     report
         Report on a sheet.
     rubric
-        Weights and penalties.
+        Weights and penalties. Goals of a lab have the points of their assignment: of the rubric lateness alone counts.
 
     Returns
     -------
@@ -109,6 +109,8 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     >>> marks(report, Rubric(points=8)).points
     2.0
     """
+    if report.is_lab_record:
+        return _marks_of_goals(report, rubric)
     if report.error or not report.entries:
         return Marks(0.0, rubric.points)
     weights = _quantity_weights(report, rubric)
@@ -138,6 +140,26 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
         tuple(entries),
         tuple(quantities),
         lost=float(total_points * lateness.share),
+        late=str(lateness) if lateness.days else "",
+    )
+
+
+def _marks_of_goals(report: GradeReport, rubric: Rubric) -> Marks:
+    """Return the points of a lab's record: a goal that passes has all its points, another one none."""
+    total = Fraction(0)
+    entries = []
+    for entry in report.entries:
+        most = report.goals.get(entry.name, 0.0)
+        got = most if entry.verdict.passes else 0.0
+        total += _exact(got)
+        entries.append(Mark(entry.name, got, most, entry.verdict.value))
+    lateness = _lateness(report, rubric)
+    return Marks(
+        float(total * (1 - lateness.share)),
+        float(sum(map(_exact, report.goals.values()))),
+        tuple(entries),
+        tuple(replace(mark, rule="") for mark in entries),
+        lost=float(total * lateness.share),
         late=str(lateness) if lateness.days else "",
     )
 
@@ -185,6 +207,7 @@ def _share(entry: Entry, report: GradeReport, credit: Credit) -> tuple[Fraction,
         Verdict.ROUNDED: credit.rounding,
         Verdict.SAMPLED: 0.0 if report.proof_required else credit.sampled,
         Verdict.UNDECIDED: 0.0 if report.proof_required else credit.undecided,
+        Verdict.RECORDED: 1.0,
         Verdict.INCOMPLETE: 0.0,
         Verdict.UNREADABLE: 0.0,
     }

@@ -57,6 +57,11 @@ class NoteKind(Enum):
     """Angles of steps are read as those of the table, joint values plus offsets: more steps pass so."""
     PROGRAM = "program"
     """Remark on how a program or paper was read: ``values`` has the reader's text, with its line."""
+    LAB_WORK = "lab_work"
+    """Work on a lab's assignment began at ``values[0]``, and the last goal that counts was reached at ``values[1]``,
+    empty if there is none: ISO 8601, UTC."""
+    SIGNED = "signed"
+    """In the lab the name ``values[0]`` was typed, by which the class does not know the student."""
 
 
 @dataclass(frozen=True)

@@ -190,6 +190,8 @@ def _one_line(error: ErrorDetails) -> str:
         tables = {"credit": Credit, "late": LateRule}
         known = [field.name for field in fields(tables.get("".join(path[:-1]), Rubric))]
         place = "".join(f"{part}: " for part in path[:-1])
+        if path == ["rubric"]:
+            return "unknown key 'rubric'; expected its keys at the top: [late] for [rubric.late]"
         return f"{place}unknown key {path[-1]!r}{_hint(path[-1], known)}"
     if error["type"] == "missing":
         return f"{'.'.join(path)}: missing"

@@ -39,6 +39,8 @@ class Sheet:
         Name of the file in reports; empty for its path.
     aliases
         Other names by which a platform's export tells the student: a number, an address, an ID.
+    listed
+        Cells of the student's row in a list of students.
     series, attempt
         Sheets of a student that have the same series were handed in one after the other, in the order of their
         attempts from 0.
@@ -54,6 +56,7 @@ class Sheet:
     beside: tuple[str, ...] = ()
     shown: str = ""
     aliases: tuple[str, ...] = ()
+    listed: tuple[str, ...] = ()
     series: str = ""
     attempt: int = 0
     time: datetime | None = None
@@ -98,7 +101,7 @@ def find_sheets(
         No such file; a folder without sheets, or with too many.
     """
     found: dict[Path, Sheet] = {}
-    stems = Counter(path.stem for path in paths)
+    stems = Counter(split_name(path.name, suffixes)[0] for path in paths)
     passed_over = {path.resolve() for path in exclude}
     for path in paths:
         if not path.exists():
@@ -108,7 +111,7 @@ def find_sheets(
         for sheet in (
             _in_folder(path, passed_over, suffixes)
             if path.is_dir()
-            else [Sheet(path, _student(path, stems))]
+            else [Sheet(path, _student(path, split_name(path.name, suffixes)[0], stems))]
         ):
             found.setdefault(sheet.path.absolute(), sheet)
             if len(found) > BOUNDS.sheets:
@@ -116,10 +119,38 @@ def find_sheets(
     return list(found.values())
 
 
-def _student(path: Path, stems: Counter[str]) -> str:
+def split_name(name: str, suffixes: Collection[str]) -> tuple[str, str]:
+    """Return the name of a file without its suffix, and the suffix in lower case.
+
+    A suffix of two parts counts where it is among those given. Browsers and Canvas number copies of a file before its
+    last part; such a number belongs to neither.
+
+    Parameters
+    ----------
+    name
+        Name of the file, without folders.
+    suffixes
+        Suffixes that are looked for, such as ``.py`` and ``.lab.json``.
+
+    Examples
+    --------
+    >>> split_name("answer.v2.py", [".py", ".lab.json"]), split_name("wave.lab-1.json", [".py", ".lab.json"])
+    (('answer.v2', '.py'), ('wave', '.lab.json'))
+    """
+    for suffix in suffixes:
+        first, _, last = suffix.rpartition(".")
+        if first:
+            copy = rf"(.+){re.escape(first)}(?:-\d+| ?\(\d+\))?\.{re.escape(last)}"
+            if found := re.fullmatch(copy, name, re.IGNORECASE | re.DOTALL | re.ASCII):
+                return found[1], suffix
+    path = Path(name)
+    return path.stem, path.suffix.lower()
+
+
+def _student(path: Path, stem: str, stems: Counter[str]) -> str:
     if stems.total() == 1:
         return ""
-    return path.absolute().parent.name if stems[path.stem] > 1 else path.stem
+    return path.absolute().parent.name if stems[stem] > 1 else stem
 
 
 def _in_folder(root: Path, passed_over: Collection[Path], suffixes: Collection[str]) -> list[Sheet]:
@@ -204,13 +235,14 @@ def visit(root: Path, suffixes: Collection[str]) -> Iterator[Sheet]:
                 f"{root}: more than {BOUNDS.files} files; expected a folder of answer sheets"
             )
         parts = path.relative_to(root).parts
-        student = path.stem if len(parts) == 1 else parts[0]
+        stem, suffix = split_name(path.name, suffixes)
+        student = stem if len(parts) == 1 else parts[0]
         if path.is_symlink() and (fault := _fault_of_link(path, inside, suffixes)):
             yield Sheet(path, student, fault)
         elif path.is_dir():
             if fault := _fault_of_folder(path, len(parts)):
                 yield Sheet(path, student, fault)
-        elif path.suffix.lower() not in suffixes or _is_robot(path):
+        elif suffix not in suffixes or _is_robot(path):
             yield Sheet(path, student, UNREAD)
         else:
             yield Sheet(path, student, "" if path.is_file() else "not a regular file")
@@ -238,11 +270,12 @@ def _walk(folder: Path, depth: int) -> Iterator[Path]:
 
 def _fault_of_link(path: Path, inside: Path, suffixes: Collection[str]) -> str:
     """Return the error of a link; empty if its target is inside the folder, or would not be a sheet."""
+    is_sheet = split_name(path.name, suffixes)[1] in suffixes
     try:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError):
-        return "a link that leads nowhere" if path.suffix.lower() in suffixes else ""
-    if target.is_relative_to(inside) or not (target.is_dir() or path.suffix.lower() in suffixes):
+        return "a link that leads nowhere" if is_sheet else ""
+    if target.is_relative_to(inside) or not (target.is_dir() or is_sheet):
         return ""
     return "a link out of the folder; it is not followed"
 

@@ -11,12 +11,15 @@ from pathlib import Path
 
 from dhkit.display import plain, value_line
 from dhkit.errors import AnswerError, DhkitError
+from dhkit.grading.grade_report import Verdict
 from dhkit.grading.reports.marks_csv import cell
 from dhkit.lab.assignment import Assignment, Goal, Place
 from dhkit.lab.record import SUFFIX, Reached, Record, is_confirmed
 
 MAX_CELL = 1_000
 """Longest text of a cell, characters."""
+OTHER_ASSIGNMENT = "the record is about another assignment, or another version of this one"
+"""Note on a record without points."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,29 @@ class LabMark:
     __repr__ = value_line
 
 
+@dataclass(frozen=True)
+class CheckedGoal:
+    """A goal of an assignment, checked again from the evidence of a record.
+
+    Attributes
+    ----------
+    place, goal
+        The goal, and its place in the assignment.
+    verdict
+        Correct if the evidence shows it, wrong if it does not; taken from the record if that cannot be checked again;
+        incomplete if it was not reached.
+    time
+        When the goal was reached, as the record says it; empty if it was not.
+    """
+
+    place: Place
+    goal: Goal
+    verdict: Verdict
+    time: str = ""
+
+    __repr__ = value_line
+
+
 def find_records(paths: Sequence[Path]) -> list[Path]:
     """Return the records among files and folders, each once, by name within a folder.
 
@@ -90,37 +116,44 @@ def lab_mark(path: Path, assignment: Assignment) -> LabMark:
             path, "", 0.0, assignment.points, notes=(str(error).removeprefix(f"{path}: "),)
         )
     if record.digest != assignment.digest:
-        note = "the record is about another assignment, or another version of this one"
-        return LabMark(path, record.student, 0.0, assignment.points, notes=(note,))
-    points: list[float] = []
-    notes: list[str] = []
-    unchecked = 0
-    times: list[str] = []
-    for i, step in enumerate(assignment.steps):
-        for j, goal in enumerate(step.goals):
-            reached = record.reached.get(Place(i, j))
-            if reached is None:
-                points.append(0.0)
-                continue
-            confirmed = _confirmed(assignment, goal, reached)
-            unchecked += confirmed is None
-            if confirmed is False:
-                notes.append(f"step {i + 1}, goal {j + 1}: the evidence does not show it")
-            points.append(0.0 if confirmed is False else goal.points)
-            if confirmed is not False and _is_time(reached.time):
-                times.append(reached.time)
-    last = max(times, default="")
+        return LabMark(path, record.student, 0.0, assignment.points, notes=(OTHER_ASSIGNMENT,))
+    checked = checked_goals(record, assignment)
+    points = tuple(one.goal.points if one.verdict.passes else 0.0 for one in checked)
+    refuted = [one.place for one in checked if one.verdict is Verdict.WRONG]
     return LabMark(
         path,
         record.student,
         sum(points),
         assignment.points,
-        tuple(points),
-        last,
+        points,
+        last_time(checked),
         record.begun,
-        unchecked,
-        tuple(notes),
+        sum(one.verdict is Verdict.RECORDED for one in checked),
+        tuple(
+            f"step {place.step + 1}, goal {place.goal + 1}: the evidence does not show it"
+            for place in refuted
+        ),
     )
+
+
+def checked_goals(record: Record, assignment: Assignment) -> list[CheckedGoal]:
+    """Return all goals of an assignment, in its order, checked from the evidence of a record."""
+    checked = []
+    for place in assignment.places:
+        goal = assignment.steps[place.step].goals[place.goal]
+        reached = record.reached.get(place)
+        if reached is None:
+            checked.append(CheckedGoal(place, goal, Verdict.INCOMPLETE))
+        else:
+            verdict = _VERDICTS[_confirmed(assignment, goal, reached)]
+            checked.append(CheckedGoal(place, goal, verdict, reached.time))
+    return checked
+
+
+def last_time(checked: Sequence[CheckedGoal]) -> str:
+    """Return when the last goal that counts was reached: ISO 8601, UTC; empty if none was."""
+    times = [one.time for one in checked if one.verdict.passes and _is_time(one.time)]
+    return max(times, default="")
 
 
 def lab_marks(paths: Sequence[Path], assignment: Assignment) -> list[LabMark]:
@@ -142,6 +175,10 @@ def _is_time(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+_VERDICTS = {True: Verdict.CORRECT, False: Verdict.WRONG, None: Verdict.RECORDED}
+"""Verdict on a goal that was reached, by what :func:`_confirmed` says."""
 
 
 def _confirmed(assignment: Assignment, goal: Goal, reached: Reached) -> bool | None:

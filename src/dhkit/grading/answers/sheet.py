@@ -51,6 +51,9 @@ KEYS = {
 }
 """Keys that a document, and each table in it, may have. No key stands in two tables with two meanings."""
 
+RUBRIC_KEYS = ("points", "weights", "credit", "digits", "feedback", "late")
+"""Keys of the table of a rubric, which :class:`dhkit.grading.rubric.Rubric` reads."""
+
 VARIANT_KEYS = ("parameters", "robots", "conventions", "payload", "digits")
 """Keys of a task's table of variants, which :class:`dhkit.grading.variants.Variants` reads."""
 
@@ -247,6 +250,9 @@ class _Checker:
             if key not in known:
                 close = difflib.get_close_matches(key, known, n=1)
                 hint = f"did you mean {close[0]!r}?" if close else f"expected {', '.join(known)}"
+                if key in RUBRIC_KEYS:
+                    place = f"[rubric.{key}]" if isinstance(table[key], Mapping) else "[rubric]"
+                    hint = f"it belongs to the rubric: expected it in {place}"
                 raise AnswerError(f"{self.file}: unknown key {prefix}{key[:60]!r}; {hint}")
 
     def _value(

@@ -78,6 +78,16 @@ def executed_source(
 # The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.
 
 
+def import_readers() -> None:
+    """Import the readers of all languages, so that processes that are forked for the sheets of a class inherit them."""
+    import dhkit.grading.answers.documents.latex_document
+    import dhkit.grading.answers.documents.latex_source
+    import dhkit.grading.answers.programs.matlab_program
+    import dhkit.grading.answers.programs.notebook
+    import dhkit.grading.answers.programs.program_answers
+    import dhkit.grading.answers.programs.python_program  # noqa: F401
+
+
 def _python(
     text: str, file: str, line_name: LineName, description: Description, names: Names
 ) -> AnswerSheet:

@@ -56,6 +56,11 @@ class Truth:
         """
         return lagrangian(self.description)
 
+    @cached_property
+    def numbers(self) -> Mapping[str, Fraction]:
+        """The file's numbers of the parameters, in SI units or rad."""
+        return {name: exact_number(self.description, name) for name in self.description.parameters}
+
     def arm(self, quantity: str) -> ExactArm:
         """Return the arm to whose ring a quantity belongs."""
         return self.lagrangian.arm if quantity in DYNAMICS else self.kinematics.arm
@@ -64,9 +69,7 @@ class Truth:
         """Return a reader into a quantity's ring, with numbers for the parameters that the ring does not have."""
         ring = self.arm(quantity).ring
         names = self.description.parameters.keys() - set(ring.constants)
-        return RingReader(
-            ring, numbers={name: exact_number(self.description, name) for name in names}
-        )
+        return RingReader(ring, numbers={name: self.numbers[name] for name in names})
 
     def of(self, quantity: str) -> Elements:
         """Return the right value of a quantity, an array of elements in the quantity's shape.
@@ -85,9 +88,7 @@ class Truth:
     def with_numbers(self, quantity: str, array: Elements, numbers: Collection[str]) -> Elements:
         """Return elements of a quantity's ring with the file's numbers instead of some parameters."""
         ring = self.arm(quantity).ring
-        return substituted(
-            array, {p: ring.number(exact_number(self.description, p)) for p in numbers}, ring
-        )
+        return substituted(array, {p: ring.number(self.numbers[p]) for p in numbers}, ring)
 
     def _in_robot_variables(self, quantity: str) -> Elements:
         """Return the right value of a quantity in the robot's own joint variables."""

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from dhkit.description import Array
+from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.numeric import general_state, state_arrays
 from dhkit.grading.judging.quantities import Index, place_of
 from dhkit.grading.judging.quotients import varying
@@ -43,24 +44,57 @@ _ROUNDED_DECIMALS = 2e-3
 one: numbers of four decimals, multiplied and added, stay below it."""
 
 
-class Variants:
-    """Mistakes on one robot with the changes that they cause; computed quantity by quantity when first asked for.
+@dataclass(frozen=True)
+class _Subject:
+    """All that the possible mistakes on a robot depend on, which is not the numbers of its parameters.
 
-    Parameters
+    Mistakes are derived in the ring whose symbols are the parameters. Arms that differ in their numbers alone, such as
+    those of a task's variants, have equal rings and equal derivations: these are shared.
+
+    Attributes
     ----------
+    shape
+        The fields of the robot's description in which mistakes may be made, without the numbers of its parameters.
+    coordinates, friction
+        As those of the truth.
     truth
-        The right answers.
-    numbers
-        Names of the parameters that this student replaced by their numbers in the file.
+        The truth of one of the arms, from which the mistakes are derived.
     """
 
-    def __init__(self, truth: Truth, numbers: frozenset[str]) -> None:
-        self.truth = truth
-        self.numbers = numbers
-        self._changes: dict[str, list[_Changed]] = {}
-        self._by_entry: dict[str, dict[tuple[Index, _Key], list[_Changed]]] = {}
-        self._pairs: dict[str, _Pairs] = {}
-        self._values: dict[str, list[Array]] = {}
+    shape: tuple[object, ...]
+    coordinates: Coordinates
+    friction: bool
+    truth: Truth = field(compare=False)
+
+    @classmethod
+    def of(cls, truth: Truth) -> _Subject:
+        arm = truth.description
+        # A parameter that is defined by others is part of the shape; one that is a number is a symbol.
+        parameters = tuple(
+            (name, value if value.symbols else None) for name, value in arm.parameters.items()
+        )
+        shape = (
+            arm.convention,
+            arm.joints,
+            parameters,
+            arm.gravity,
+            arm.base,
+            arm.tool,
+            arm.couplings,
+        )
+        return cls(shape, truth.coordinates, truth.friction, truth)
+
+
+@lru_cache(maxsize=32)
+def _mistakes_of(subject: _Subject) -> _Mistakes:
+    return _Mistakes(subject.truth)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mistakes:
+    """Possible mistakes on all arms that have the symbols of one; none of them has a number of its parameters."""
+
+    truth: Truth
 
     @cached_property
     def dynamic(self) -> list[Variant]:
@@ -99,6 +133,40 @@ class Variants:
             *_columns_exchanged(truth),
             *sums_of_angles(truth.kinematics.arm, right, is_kinematic=True),
         ]
+
+
+class Variants:
+    """Mistakes on one robot with the changes that they cause; computed quantity by quantity when first asked for.
+
+    Parameters
+    ----------
+    truth
+        The right answers.
+    numbers
+        Names of the parameters that this student replaced by their numbers in the file.
+    """
+
+    def __init__(self, truth: Truth, numbers: frozenset[str]) -> None:
+        self.truth = truth
+        self.numbers = numbers
+        self._changes: dict[str, list[_Changed]] = {}
+        self._by_entry: dict[str, dict[tuple[Index, _Key], list[_Changed]]] = {}
+        self._pairs: dict[str, _Pairs] = {}
+        self._values: dict[str, list[Array]] = {}
+
+    @cached_property
+    def _mistakes(self) -> _Mistakes:
+        return _mistakes_of(_Subject.of(self.truth))
+
+    @property
+    def dynamic(self) -> list[Variant]:
+        """Possible mistakes in the robot's equations, the most common first."""
+        return self._mistakes.dynamic
+
+    @property
+    def kinematic(self) -> list[Variant]:
+        """Possible mistakes in the robot's transforms and Jacobian."""
+        return self._mistakes.kinematic
 
     def change(self, variant: Variant, quantity: str) -> Elements:
         """Return the change of a quantity by a mistake, with the file's numbers for the parameters in ``numbers``."""

@@ -13,6 +13,7 @@ from dhkit.display import counted
 from dhkit.grading.catalogue import LIBRARY, capitalize
 from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.marks import Marks
+from dhkit.grading.remarks import NoteKind
 from dhkit.grading.reports import sentences
 from dhkit.grading.reports.html import (
     STYLE,
@@ -73,6 +74,7 @@ def html_class(
     marks: Sequence[Marks],
     title: str = "Class",
     table: str = "",
+    totals: str = "",
 ) -> str:
     """Return the page of a class.
 
@@ -84,16 +86,23 @@ def html_class(
         Heading.
     table
         Address of the marks as CSV, beside the page; no link if empty.
+    totals
+        Address of the sums of each student's marks as CSV, likewise.
     """
     pairs = zip(reports, marks, strict=True)
     rows = [_Row(number, *pair) for number, pair in enumerate(pairs, start=1)]
     parts = [f"<p>{line}</p>" for line in _summary(rows)]
+    links = [f'<a href="{escape(address)}">{escape(address)}</a>' for address in (table, totals)]
     if table:
-        parts.append(f'<p>The marks as a table: <a href="{escape(table)}">{escape(table)}</a>.</p>')
+        by_student = f", and of each student together: {links[1]}" if totals else ""
+        parts.append(f"<p>The marks as a table: {links[0]}{by_student}.</p>")
     warnings = sentences.class_warnings(reports)
     parts += [f'<p class="error">{html_text(line)}</p>' for line in warnings]
-    most = max((row.marks.most for row in rows), default=0.0)
-    parts.append(histogram([row.marks.points for row in rows], most))
+    kinds = _parts(rows)
+    for noun, part in kinds:
+        most = max(row.marks.most for row in part)
+        heading = "Points" if len(kinds) == 1 else f"Points of {noun}s"
+        parts.append(histogram([row.marks.points for row in part], most, noun, heading))
     parts += [*_for_a_person(rows), *_mistakes(rows)]
     parts += ['<h2 id="marks">Marks</h2>', _marks_table(rows)]
     for row in rows:
@@ -104,28 +113,42 @@ def html_class(
     return report_page(title, "\n".join(parts), CLASS_STYLE)
 
 
+def _parts(rows: Sequence[_Row]) -> list[tuple[str, list[_Row]]]:
+    """Return the sheets and the lab records with their nouns, as far as there are any."""
+    sheets = [row for row in rows if not row.report.is_lab_record]
+    records = [row for row in rows if row.report.is_lab_record]
+    return [(noun, part) for noun, part in (("sheet", sheets), ("lab record", records)) if part]
+
+
+def _noun(rows: Sequence[_Row]) -> str:
+    """Return what all rows are, in the singular."""
+    parts = _parts(rows)
+    return parts[0][0] if len(parts) == 1 else "file"
+
+
 def _summary(rows: Sequence[_Row]) -> Iterator[str]:
     """Yield the sentences with which the page begins, as HTML."""
-    if not rows:
-        return
-    students = {row.report.student for row in rows}
-    whose = "" if len(students) == len(rows) else f" of {counted(len(students), 'student')}"
-    verdicts = Counter(row.report.verdict for row in rows)
-    counts = ", ".join(
-        f"{verdicts[verdict]} {verdict.value}" for verdict in Verdict if verdicts[verdict]
-    )
-    yield f"{counted(len(rows), 'sheet')}{whose}: {counts}."
-    given = [row.marks.points for row in rows]
-    most = points(max(row.marks.most for row in rows))
-    yield (
-        f"Of {most} points the sheets have {points(mean(given))} on average; half of them have "
-        f"{points(median(given))} or more."
-    )
+    for noun, part in _parts(rows):
+        students = {row.report.student for row in part}
+        whose = "" if len(students) == len(part) else f" of {counted(len(students), 'student')}"
+        verdicts = Counter(row.report.verdict for row in part)
+        counts = ", ".join(
+            f"{verdicts[verdict]} {verdict.value}" for verdict in Verdict if verdicts[verdict]
+        )
+        yield f"{counted(len(part), noun)}{whose}: {counts}."
+        given = [row.marks.points for row in part]
+        most = points(max(row.marks.most for row in part))
+        yield (
+            f"Of {most} points the {noun}s have {points(mean(given))} on average; half of them have "
+            f"{points(median(given))} or more."
+        )
     if late := sum(bool(row.marks.late) for row in rows):
-        yield f"{counted(late, 'sheet')} came late and lost points."
+        yield f"{counted(late, _noun(rows))} came late and lost points."
 
 
-def histogram(given: Sequence[float], most: float, noun: str = "sheet") -> str:
+def histogram(
+    given: Sequence[float], most: float, noun: str = "sheet", heading: str = "Points"
+) -> str:
     """Return the distribution of points as HTML: bars of equal width, the last with its right end.
 
     Parameters
@@ -136,6 +159,8 @@ def histogram(given: Sequence[float], most: float, noun: str = "sheet") -> str:
         Points possible.
     noun
         What has the points, in the singular.
+    heading
+        Heading of the picture.
     """
     if len(given) < 2 or not most:
         return ""
@@ -164,24 +189,24 @@ def histogram(given: Sequence[float], most: float, noun: str = "sheet") -> str:
         x = min(max(k * width, 3.0 * len(label)), _WIDTH - 3.0 * len(label))
         shapes.append(f'<text x="{x:.1f}" y="{_HEIGHT + 13}">{label}</text>')
     return (
-        f'<h2>Points</h2>\n<p class="note">{noun.capitalize()}s by their points</p>\n'
+        f'<h2>{escape(heading)}</h2>\n<p class="note">{noun.capitalize()}s by their points</p>\n'
         f'<svg class="points" viewBox="0 0 {_WIDTH} {_HEIGHT + 18}" role="img" aria-label="{text}">'
         f'<line x1="0" y1="{_HEIGHT}" x2="{_WIDTH}" y2="{_HEIGHT}"/>{"".join(shapes)}</svg>'
     )
 
 
 def _for_a_person(rows: Sequence[_Row]) -> Iterator[str]:
-    """Yield what a person has to look at: first what could not be read, then undecided answers, then files."""
+    """Yield what a person has to look at: first what could not be read, then lab records, undecided answers, files."""
     unreadable = [
         f"{row.link}: {html_text(row.report.fault, 300)}"
         for row in rows
         if row.report.verdict is Verdict.UNREADABLE
     ]
-    undecided = []
-    for row in rows:
-        names = [entry.name for entry in row.report.entries if entry.verdict is Verdict.UNDECIDED]
-        if names:
-            undecided.append(f"{row.link}: {html_text(', '.join(names), 200)}")
+    records = [row for row in rows if row.report.is_lab_record]
+    signatures = []
+    for row in records:
+        signed = [note for note in row.report.notes if note.kind is NoteKind.SIGNED]
+        signatures += [f"{row.link}: {html_text(note.values[0], 120)}" for note in signed]
     refused = [
         f"{row.link}: {html_text('; '.join(row.report.left_out), 300)}"
         for row in rows
@@ -189,17 +214,34 @@ def _for_a_person(rows: Sequence[_Row]) -> Iterator[str]:
     ]
     lists = [
         ("Could not be read", unreadable),
-        ("Neither proved nor refuted: the answers agree wherever they were tried", undecided),
+        ("Goals of the lab whose evidence does not show them", _with(records, Verdict.WRONG)),
+        ("Another name was typed in the lab than the student's", signatures),
+        (
+            "Neither proved nor refuted: the answers agree wherever they were tried",
+            _with(rows, Verdict.UNDECIDED),
+        ),
+        ("Goals of the lab that cannot be checked again", _with(records, Verdict.RECORDED)),
         ("Files and statements that were not read as answers", refused),
     ]
     if not any(lines for _, lines in lists):
         yield "<h2>What needs a person</h2>\n<p>Nothing: all was read and decided.</p>"
         return
+    noun = _noun(rows)
     yield "<h2>What needs a person</h2>"
     for text, lines in lists:
         if lines:
-            yield f'<h3>{text} <span class="note">{counted(len(lines), "sheet")}</span></h3>'
+            yield f'<h3>{text} <span class="note">{counted(len(lines), noun)}</span></h3>'
             yield folded_list(lines)
+
+
+def _with(rows: Sequence[_Row], verdict: Verdict) -> list[str]:
+    """Return a line of HTML for each row that has entries with a verdict, which it names."""
+    lines = []
+    for row in rows:
+        names = [entry.name for entry in row.report.entries if entry.verdict is verdict]
+        if names:
+            lines.append(f"{row.link}: {html_text(', '.join(names), 200)}")
+    return lines
 
 
 def folded_list(lines: Sequence[str]) -> str:
@@ -219,7 +261,8 @@ def _mistakes(rows: Sequence[_Row]) -> Iterator[str]:
     """Yield the mistakes with their sheets, the most frequent first, and the wrong sheets that no mistake explains."""
     groups: dict[str, list[_Row]] = {}
     unexplained = []
-    for row in rows:
+    sheets = [row for row in rows if not row.report.is_lab_record]
+    for row in sheets:
         names = dict.fromkeys(one.mistake for one in row.report.diagnosis if one.mistake)
         for name in names:
             groups.setdefault(name, []).append(row)
@@ -230,10 +273,10 @@ def _mistakes(rows: Sequence[_Row]) -> Iterator[str]:
     yield "<h2>What went wrong</h2>"
     ordered = sorted(groups.items(), key=lambda group: (-len(group[1]), group[0]))
     for name, having in ordered:
-        yield group(_sentence(name), plain(name, 80), [row.link for row in having], len(rows))
+        yield group(_sentence(name), plain(name, 80), [row.link for row in having], len(sheets))
     if unexplained:
         text = "Wrong, and no mistake that has a name gives the answers."
-        yield group(text, "", [row.link for row in unexplained], len(rows))
+        yield group(text, "", [row.link for row in unexplained], len(sheets))
 
 
 def _sentence(mistake: str) -> str:

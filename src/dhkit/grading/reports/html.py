@@ -17,6 +17,7 @@ _BADGES = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),
     Verdict.SAMPLED: ("open", "∼"),
+    Verdict.RECORDED: ("open", "R"),
     Verdict.UNDECIDED: ("open", "?"),
     Verdict.INCOMPLETE: ("open", "…"),
     Verdict.WRONG: ("wrong", "✗"),

@@ -15,6 +15,7 @@ _OUTCOMES = {
     Verdict.INCOMPLETE: "failure",
     Verdict.UNREADABLE: "error",
     Verdict.SAMPLED: "skipped",
+    Verdict.RECORDED: "skipped",
     Verdict.UNDECIDED: "skipped",
 }
 """Element inside the case of an entry that does not simply pass."""

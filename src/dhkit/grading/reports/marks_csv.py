@@ -1,4 +1,4 @@
-"""Marks of a class as CSV: a row for each sheet, a column for each quantity."""
+"""Marks of a class as CSV: a row for each file, a column for each quantity or goal; and the sum of each student."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import io
 import re
 from collections.abc import Sequence
 from itertools import chain
+from math import fsum
 from pathlib import PurePath
 
-from dhkit.grading.grade_report import GradeReport
+from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.marks import Marks
-from dhkit.grading.reports.sentences import plain, points
+from dhkit.grading.remarks import NoteKind
+from dhkit.grading.reports.notes import note_text
+from dhkit.grading.reports.sentences import equal_records, plain, points
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 """First characters of a text that a spreadsheet would compute."""
@@ -20,6 +23,9 @@ _AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "err
 """Columns after the points of the quantities."""
 _LATENESS = ("handed in", "before", "late")
 """Columns of a class whose export says when sheets were handed in: time, points before lateness, lateness."""
+_LAB = ("last goal", "not checked again", "notes")
+"""Columns of a class with lab records: time of the last goal, goals on the record's word, what a person should know."""
+TOTALS_COLUMNS = ("student", "points", "most")
 _ORIGIN = ("sheet", "robot", "digest", "version")
 """Last columns: fields of a report that name the file judged and the program that judged it."""
 
@@ -45,6 +51,8 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     all_marks = chain.from_iterable(sheet.quantities for sheet in marks)
     quantities = list(dict.fromkeys(mark.name for mark in all_marks))
     lateness = _LATENESS if any(report.handed_in for report in reports) else ()
+    lab = _LAB if any(report.is_lab_record for report in reports) else ()
+    equal = {id(report): other for report, other in equal_records(reports)} if lab else {}
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(
@@ -55,6 +63,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             *lateness,
             *(cell(plain(name)) for name in quantities),
             *_AFTER_POINTS,
+            *lab,
             *_ORIGIN,
         ]
     )
@@ -72,8 +81,70 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             "; ".join(report.left_out),
             " ".join(dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)),
             report.fault,
-            PurePath(report.sheet or "").suffix.removeprefix("."),
+            _kind(report),
+            *(_lab_cells(report, equal.get(id(report))) if lab else ()),
             *(getattr(report, name) or "" for name in _ORIGIN),
         ]
         writer.writerow([cell(plain(text)) for text in row])
+    return file.getvalue()
+
+
+def _kind(report: GradeReport) -> str:
+    """Return the kind of a file: its suffix, or lab for the record of a lab."""
+    if report.is_lab_record:
+        return "lab"
+    return PurePath(report.sheet or "").suffix.removeprefix(".")
+
+
+def _lab_cells(report: GradeReport, equal: GradeReport | None) -> tuple[str, str, str]:
+    """Return the cells of a row below the columns of lab records, which are empty for a sheet.
+
+    Parameters
+    ----------
+    report
+        The report of the row.
+    equal
+        Report of another student's record that began and ended at the same seconds; None if there is none.
+    """
+    if not report.is_lab_record:
+        return "", "", ""
+    last = ""
+    notes = []
+    for note in report.notes:
+        if note.kind is NoteKind.LAB_WORK:
+            last = note.values[1]
+        else:
+            notes.append(note_text(note))
+    if equal is not None:
+        notes.append(f"began and ended at the same seconds as {equal.sheet}")
+    recorded = sum(entry.verdict is Verdict.RECORDED for entry in report.entries)
+    return last, str(recorded), "; ".join(notes)
+
+
+def totals_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
+    """Return the points of each student as CSV text, in the order of their first rows: sums of the rows of marks.
+
+    Sheets and lab records are two parts of the whole. A student without one of them has no points for it, out of those
+    that the others could get.
+
+    Parameters
+    ----------
+    reports, marks
+        Reports and marks of all rows that count.
+    """
+    most_of_part: dict[bool, float] = {}
+    rows: dict[str, list[tuple[bool, Marks]]] = {}
+    for report, of_file in zip(reports, marks, strict=True):
+        part = report.is_lab_record
+        most_of_part[part] = max(of_file.most, most_of_part.get(part, 0.0))
+        rows.setdefault(report.student, []).append((part, of_file))
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(TOTALS_COLUMNS)
+    for student, own in rows.items():
+        handed_in = {part for part, _ in own}
+        missing = [most for part, most in most_of_part.items() if part not in handed_in]
+        got = fsum(of_file.points for _, of_file in own)
+        most = fsum([*(of_file.most for _, of_file in own), *missing])
+        writer.writerow([cell(plain(student)), points(got), points(most)])
     return file.getvalue()

@@ -48,6 +48,8 @@ SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.SOLUTIONS_MISSING: "{quantity}: the branches give {first} of the {second} solutions that the arm has in "
     "general",
     NoteKind.PROGRAM: "{values}",
+    NoteKind.LAB_WORK: "work began at {first}; time of the last goal: {second}",
+    NoteKind.SIGNED: "the name typed in the lab is {first!r}, which is not the student's",
 }
 
 

@@ -15,6 +15,7 @@ from dhkit import display
 from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.marks import Mark, Marks
+from dhkit.grading.remarks import NoteKind
 from dhkit.grading.reports.notes import note_text
 from dhkit.grading.rubric import Feedback
 
@@ -147,6 +148,26 @@ def class_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
     """Yield what a teacher has to know before reading the marks of a class."""
     yield from _own_robot_warnings(reports)
     yield from _repeated_students(reports)
+    for report, other in equal_records(reports):
+        yield (
+            f"the lab records of {plain(other.student, 60)} and {plain(report.student, 60)} "
+            "began and ended at the same seconds"
+        )
+
+
+def equal_records(reports: Sequence[GradeReport]) -> Iterator[tuple[GradeReport, GradeReport]]:
+    """Yield each lab record that began and ended when an earlier one of another student did, with that one.
+
+    A file that several students of a group handed in together is one record.
+    """
+    first: dict[tuple[str, ...], GradeReport] = {}
+    for report in reports:
+        times = next((note.values for note in report.notes if note.kind is NoteKind.LAB_WORK), ())
+        if not all(times) or not times:
+            continue
+        other = first.setdefault(times, report)
+        if other.student != report.student and other.sheet != report.sheet:
+            yield report, other
 
 
 def _own_robot_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
@@ -162,7 +183,7 @@ def _repeated_students(reports: Sequence[GradeReport]) -> Iterator[str]:
     """Yield a line for each student with several sheets, which says that none of them is preferred."""
     sheets: dict[str, list[str]] = {}
     for report in reports:
-        if report.student:
+        if report.student and not report.is_lab_record:
             sheets.setdefault(report.student, []).append(PurePath(report.sheet or "").name)
     several = {student: names for student, names in sheets.items() if len(names) > 1}
     if len(several) > _MOST_REPEATED:

@@ -18,6 +18,7 @@ _STYLES = {
     Verdict.CORRECT: "green",
     Verdict.ROUNDED: "green",
     Verdict.SAMPLED: "yellow",
+    Verdict.RECORDED: "yellow",
     Verdict.UNDECIDED: "yellow",
     Verdict.INCOMPLETE: "yellow",
     Verdict.WRONG: "red",

@@ -6,6 +6,7 @@ import hashlib
 import json
 import unicodedata
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -151,6 +152,19 @@ class VariantKey:
             return read_robot(path)
         except (OSError, DescriptionError) as error:
             raise AnswerError(f"{path}: {error}") from None
+
+    @cached_property
+    def examples(self) -> tuple[Description, ...]:
+        """An arm for each robot and convention in the key: students with the same have other numbers in it alone."""
+        first: dict[tuple[object, object], str] = {}
+        for student, variant in self.variants.items():
+            first.setdefault((variant.get("robot"), variant.get("convention")), student)
+        arms = []
+        for student in first.values():
+            # A robot file that is missing or was changed is told where its student's sheets are judged.
+            with suppress(AnswerError):
+                arms.append(self.robot_of(student))
+        return tuple(arms)
 
     def changed(self, variants: Sequence[Variant]) -> list[str]:
         """Return the students who are in the key with other numbers than these variants have.

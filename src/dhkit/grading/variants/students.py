@@ -83,6 +83,40 @@ def _letters(text: str) -> str:
     return "".join(character for character in text if _is_letter(character))
 
 
+def is_name_of(typed: str, names: Iterable[str]) -> bool:
+    """Return whether a name that a person typed agrees with one of those by which the person is known.
+
+    Two names agree if all words of one are in the other, in any order and case: ``Ada Lovelace`` and ``lovelaceada``,
+    ``Ada`` and ``Lovelace, Ada``. Names without a letter, such as numbers, are not compared.
+
+    Parameters
+    ----------
+    typed
+        The name that was typed.
+    names
+        Names by which the person is known.
+
+    Returns
+    -------
+    bool
+        Whether one agrees, or there is none to compare.
+
+    Examples
+    --------
+    >>> is_name_of("Ada Lovelace", ["101", "lovelaceada"]), is_name_of("Bob", ["ada"]), is_name_of("Bob", ["101"])
+    (True, False, True)
+    """
+    known = [name for name in names if any(map(str.isalpha, name))]
+    return not known or any(_has_words(name, typed) or _has_words(typed, name) for name in known)
+
+
+def _has_words(name: str, other: str) -> bool:
+    """Return whether all words of one name, numbers left out, are in another one."""
+    words = [_letters(word) for word in re.split(r"[\W\d_]+", name)]
+    words = [word for word in words if word]
+    return bool(words) and all(word in _letters(other) for word in words)
+
+
 def student_id(text: str) -> str:
     """Return a student's id in Unicode's composed form, or refuse one that could not be a folder's name.
 
