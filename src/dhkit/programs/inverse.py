@@ -40,6 +40,7 @@ SOLUTION_ORDERS = {
     "yaw_two": (0, 2, 1),
     "three_parallel": (0, 4, 5, 2, 1, 3),
     "yaw_three": (0, 2, 1, 3),
+    "five_joints": (0, 2, 1, 3, 4),
 }
 """Indices of joints, from 0, in the order in which they are solved for, by family of arms, where it is not that of the
 chain: the third before the second."""

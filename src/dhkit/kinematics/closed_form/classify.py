@@ -11,6 +11,7 @@ from dhkit.display import LONGEST_LINE, plain
 from dhkit.kinematics.axes import TOLERANCE, Axes
 from dhkit.kinematics.closed_form import (
     arm_angle,
+    five_joints,
     planar,
     spherical_shoulder,
     spherical_wrist,
@@ -25,6 +26,7 @@ FAMILIES = (
     Family(
         "three_parallel", three_parallel.three_parallel_fit, three_parallel.three_parallel_formulas
     ),
+    Family("five_joints", five_joints.five_joints_fit, five_joints.five_joints_formulas),
     Family("yaw_three", turret.yaw_three_fit, turret.yaw_three_formulas),
     Family("yaw_two", turret.yaw_two_fit, turret.yaw_two_formulas),
     Family("pan_tilt", turret.pan_tilt_fit, turret.pan_tilt_formulas),
