@@ -6,7 +6,7 @@ import pytest
 from dhkit import Arm, pose
 from dhkit.description import from_dh, library_robot
 from dhkit.errors import ModelError, UnreachableError
-from dhkit.kinematics import follow_path, forward_kinematics, singular_configurations
+from dhkit.kinematics import follow_path, forward_kinematics, path as paths, singular_configurations
 
 
 def line(T, to, count=200):
@@ -208,3 +208,25 @@ def test_joints_without_limits_go_on_through_whole_turns_by_iteration():
     path = follow_path(arm, forward_kinematics(arm, q), q0)
     assert path.ok
     assert np.abs(path.q - q).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["puma560", "panda", "ur5", "irb140", "planar2r", "stanford"])
+@pytest.mark.parametrize("limits", [True, False])
+def test_paths_are_the_same_whether_all_poses_are_known_or_one_after_the_other(
+    name, limits, monkeypatch
+):
+    arm = Arm.load(name)
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        # Waves of several turns, so that joints come to their limits and wind.
+        t = np.linspace(0, 2 * np.pi, 60)
+        middle, size = rng.uniform(-1, 1, (2, arm.n))
+        q = middle + np.outer(np.sin(t), 2 * size)
+        T = arm.fk(q)
+        together = arm.ik_path(T, q[0], limits=limits)
+        with monkeypatch.context() as patched:
+            patched.setattr(paths._NearestBranch, "chained", lambda self, at: None)
+            single = arm.ik_path(T, q[0], limits=limits)
+        assert together.branch == single.branch
+        assert np.allclose(together.q, single.q, rtol=0, atol=1e-12, equal_nan=True)
+        assert (together.switches, together.lost) == (single.switches, single.lost)

@@ -20,6 +20,7 @@ from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.trigonometric import roots_kernel
+from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
 SAME_ANGLE = 1e-6
@@ -112,21 +113,9 @@ def _singular_flags(
     J = jacobian(description, q[is_asked])
     # Without units: velocities over the reach.
     J[:, :3] /= Axes.of(description).scale
-    flags[is_asked] = np.where(_are_singular(J), np.uint8(IKFlag.singular), np.uint8(0))
+    is_singular = has_small_singular_value(J, SINGULAR)
+    flags[is_asked] = np.where(is_singular, np.uint8(IKFlag.singular), np.uint8(0))
     return flags
-
-
-def _are_singular(J: Array) -> NDArray[np.bool_]:
-    """Return whether the smallest singular value of Jacobians (N, 6, 6) without units is below that of a singularity.
-
-    It is |det J| over the product of the five others, which is at most (|J|_F^2 / 5)^(5/2): where that shows that it is
-    larger, it is not computed.
-    """
-    squares = np.sum(J * J, axis=(1, 2))
-    rows = np.flatnonzero(np.abs(np.linalg.det(J)) < 2 * SINGULAR * (squares / 5) ** 2.5)
-    singular = np.zeros(len(J), dtype=bool)
-    singular[rows] = np.linalg.svd(J[rows], compute_uv=False)[:, -1] < SINGULAR
-    return singular
 
 
 @lru_cache(maxsize=64)

@@ -21,7 +21,8 @@ from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
 from dhkit.kinematics.numeric import RESTARTS, solve_numerically
 from dhkit.kinematics.numeric_call import numeric_call
-from dhkit.kinematics.solutions import IKFlag, IKSolutions
+from dhkit.kinematics.singular_values import has_small_singular_value
+from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions
 from dhkit.kinematics.solver import solver_of
 
 _MAX_STEP = np.pi / 4
@@ -30,6 +31,8 @@ _RESTARTS_AFTER_LOST = 7
 """Number of restarts of the search for a pose that comes after a lost one."""
 _FAR = 1e6
 """Joint value that stands for none, rad or m, farther away than any."""
+_CHUNK = 4096
+"""Poses whose branches are compared together, some 15 MB."""
 _WHOLE = 6
 """Fewest joints of an arm that reaches whole poses."""
 _TOLERANCE = 1e-12
@@ -175,6 +178,13 @@ def _followed_by_branches(
     has_free_joint = np.asarray(at_singularity.any(axis=-1))
     is_usable = np.asarray(usable.any(axis=-1))
     near = _NearestBranch.of(solutions, usable, q0, limits)
+    motion: Motion = "whole" if len(solutions.met) == 6 else "translational"
+    if len(poses) and is_usable.all() and not has_free_joint.any():
+        chain = near.chained(q0)
+        if chain is not None:
+            q, places = chain
+            names = [solutions.branches[place] for place in places]
+            return _path_of(description, q, names, q0, motion)
     q = np.full((len(poses), description.n), np.nan)
     branch = [""] * len(poses)
     at = q0
@@ -190,7 +200,6 @@ def _followed_by_branches(
             place, at = chosen
             q[k] = at
             branch[k] = solutions.branches[place]
-    motion: Motion = "whole" if len(solutions.met) == 6 else "translational"
     return _path_of(description, q, branch, q0, motion)
 
 
@@ -258,11 +267,12 @@ class _NearestBranch:
     usable: NDArray[np.bool_]
     """Shape (N, B)."""
     limits: bool
-    q: Array | None
-    """Joint values inside the limits, shape (N, B, n); branches that are not usable are far away. None for arms with a
-    joint that has several whole turns inside its limits, whose choice depends on the last pose."""
+    q: Array
+    """Joint values inside the limits, shape (N, B, n); branches that are not usable are far away."""
     turn: Array
-    """2 pi for joints of which every whole turn is allowed, 0 for others, shape (n,), rad and m."""
+    """2 pi for joints of which every whole turn, or several, are allowed, 0 for others, shape (n,), rad and m."""
+    has_several: bool
+    """Whether a joint has several whole turns inside its limits, of which the last pose decides."""
 
     @cached_property
     def has_turns(self) -> bool:
@@ -277,15 +287,48 @@ class _NearestBranch:
         width = solutions.upper - solutions.lower
         is_endless = ~solutions.prismatic & (np.isinf(width) if limits else True)
         has_one_winding = solutions.prismatic | (width < math.tau)
-        turn = np.where(is_endless, math.tau, 0.0)
-        if not np.all(is_endless | has_one_winding):
-            return cls(solutions, usable, limits, None, turn)
+        is_several = ~(is_endless | has_one_winding)
+        turn = np.where(is_endless | is_several, math.tau, 0.0)
         wound = solutions.wound(solutions.q, q0, limits=limits)
-        return cls(solutions, usable, limits, np.where(usable[..., None], wound, _FAR), turn)
+        q = np.where(usable[..., None], wound, _FAR)
+        return cls(solutions, usable, limits, q, turn, bool(is_several.any()))
+
+    def chained(self, at: Array) -> tuple[Array, list[int]] | None:
+        """Return joint values (N, n) and branches of a path whose poses all have some, each nearest to the one before.
+
+        None if whole turns would lead out of the limits: the poses must then be followed one by one.
+
+        Parameters
+        ----------
+        at
+            Joint values before the first pose, shape (n,).
+        """
+        q = self.q
+        first, at_first = self(0, at) or (0, at)
+        places = [first]
+        for begin in range(0, len(q) - 1, _CHUNK):
+            some = q[begin : begin + _CHUNK + 1]
+            # The nearest branch of each pose, from each branch of the pose before: (k, B).
+            steps = some[1:, None] - some[:-1, :, None]
+            if self.has_turns:
+                steps -= self.turn * np.rint(steps / math.tau)
+            following = np.einsum("kabn,kabn->kab", steps, steps).argmin(axis=-1)
+            for nearest in following.tolist():
+                places.append(nearest[places[-1]])
+        chosen = q[np.arange(len(q)), places]
+        # Whole turns since the first pose, whose own are right.
+        steps = np.diff(chosen, axis=0, prepend=at_first[None])
+        chosen -= self.turn * np.cumsum(np.rint(steps / math.tau), axis=0)
+        if self.has_several and self.limits:
+            lower = self.solutions.lower - LIMIT_SLACK
+            upper = self.solutions.upper + LIMIT_SLACK
+            if ((chosen < lower) | (chosen > upper)).any():
+                return None
+        return chosen, places
 
     def __call__(self, k: int, at: Array) -> tuple[int, Array] | None:
         """Return the branch of pose k that is nearest to joint values (n,), and its joint values."""
-        if self.q is None:
+        if self.has_several:
             return _nearest_branch(
                 self.solutions.q[k], self.usable[k], at, self.solutions, self.limits
             )
@@ -314,7 +357,9 @@ def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[
     J = jacobian(description, np.nan_to_num(q))
     J[:, :3] /= description.reach or 1.0
     J = J if motion == "whole" else J[:, :3]
-    smallest = np.linalg.svd(J, compute_uv=False)[:, freedoms(description, motion) - 1]
-    return tuple(
-        int(k) for k in np.flatnonzero((smallest < _NEAR_SINGULAR) & ~np.isnan(q).any(axis=-1))
-    )
+    count = freedoms(description, motion)
+    if count == J.shape[1] <= J.shape[2]:
+        is_near = has_small_singular_value(J, _NEAR_SINGULAR)
+    else:
+        is_near = np.linalg.svd(J, compute_uv=False)[:, count - 1] < _NEAR_SINGULAR
+    return tuple(np.flatnonzero(is_near & ~np.isnan(q).any(axis=-1)).tolist())
