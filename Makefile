@@ -79,6 +79,7 @@ bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside pe
 	$(BIN)/python -m benchmarks.scenes --kind spheres --scenes 48 --compared 0 --output benchmarks/results/scenes_spheres
 	$(BIN)/python -m benchmarks.scenes --kind itself --scenes 30 --compared 6 --output benchmarks/results/scenes_itself
 	$(BIN)/python -m benchmarks.control
+	$(BIN)/dhkit bench --problems benchmarks/problems --output benchmarks/results/problems
 	$(BIN)/python -m tools.readme_table
 
 $(BENCH_READY): $(READY)

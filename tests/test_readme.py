@@ -5,7 +5,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from tools.readme_table import with_table
+from tools.readme_table import with_tables
 
 from acceptance import slow_if
 from dhkit.bench import Mode, rounds
@@ -53,9 +53,9 @@ def test_the_robot_file_of_the_readme_is_one(tmp_path):
     assert not arm.warnings
 
 
-def test_the_table_of_speed_is_that_of_the_benchmark():
+def test_the_tables_are_those_of_the_benchmarks():
     """Run `python -m tools.readme_table` when this fails."""
-    assert with_table(README) == README
+    assert with_tables(README) == README
 
 
 def test_the_readme_is_short():

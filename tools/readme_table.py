@@ -1,4 +1,4 @@
-"""Write the table of README.md from the results of the benchmark: `make bench` ends with it."""
+"""Write the tables of README.md from the results of the benchmarks: `make bench` ends with it."""
 
 import json
 import re
@@ -23,7 +23,8 @@ QUANTITIES = {
 }
 BRANCHES = 8
 """Solutions that a contender of inverse kinematics must return to be in the table."""
-MARKS = ("<!-- speed: tools/readme_table.py -->\n", "<!-- end of speed -->\n")
+SPEED_MARKS = ("<!-- speed: tools/readme_table.py -->\n", "<!-- end of speed -->\n")
+PROBLEM_MARKS = ("<!-- problems: tools/readme_table.py -->\n", "<!-- end of problems -->\n")
 
 
 def speed_table() -> str:
@@ -74,13 +75,50 @@ def _named(row: dict[str, Any]) -> str:
     return f"{duration(row['seconds'])} ({row['contender']})"
 
 
-def with_table(readme: str) -> str:
-    """Return README's text with the table anew."""
-    begin, end = MARKS
+def problem_table() -> str:
+    """Return the table of solvers: how many of the known solutions each finds for the arms that it takes."""
+    rows = json.loads((RESULTS / "problems.json").read_text("utf-8"))["rows"]
+    lines = [
+        "| solver | arms | solutions found | invented | time a pose |",
+        "|---|---|---|---|---|",
+    ]
+    taken = [row for row in rows if not row["reason"]]
+    for solver in dict.fromkeys(row["contender"] for row in taken):
+        own = [row for row in taken if row["contender"] == solver]
+        found = sum(sum(row["found"].values()) for row in own)
+        known = found + sum(sum(row["missed"].values()) for row in own)
+        times = sorted(row["seconds"] for row in own)
+        span = duration(times[0])
+        if len(times) > 1:
+            span += f" to {duration(times[-1])}"
+        cells = (
+            solver,
+            len(own),
+            f"{found:,} of {known:,}",
+            sum(row["invented"] for row in own),
+            span,
+        )
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    arms = {row["robot"]: row["poses"] for row in rows}
+    count = f"The {sum(arms.values())} poses of {len(arms)} arms"
+    place = "[benchmarks/problems](benchmarks/problems)"
+    kinds = "regular, next to singularities and limits, and out of reach"
+    lines.append(f"\n{count} in {place}: {kinds}.")
+    return "\n".join(lines) + "\n"
+
+
+def with_tables(readme: str) -> str:
+    """Return README's text with the tables anew."""
+    return _between(_between(readme, SPEED_MARKS, speed_table()), PROBLEM_MARKS, problem_table())
+
+
+def _between(text: str, marks: tuple[str, str], content: str) -> str:
+    """Return a text with the content between two marks replaced."""
+    begin, end = marks
     pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
-    return pattern.sub(lambda _: f"{begin}{speed_table()}{end}", readme)
+    return pattern.sub(lambda _: f"{begin}{content}{end}", text)
 
 
 if __name__ == "__main__":
     path = ROOT / "README.md"
-    write_atomically(path, with_table(path.read_text("utf-8")))
+    write_atomically(path, with_tables(path.read_text("utf-8")))

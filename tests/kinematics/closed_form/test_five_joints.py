@@ -126,6 +126,37 @@ def test_a_path_of_five_joints_is_followed():
     assert np.allclose(SO101.fk(path.q), SO101.fk(q), atol=1e-10)
 
 
+SO101_ORIGINS = """\
+0.0207909 -0.0230745 0.0948817  -3.14159 6.03684e-16 1.5708
+-0.0303992 -0.0182778 -0.0542  -1.5708 -1.5708 0
+-0.11257 -0.028 2.46331e-16  -1.22818e-15 5.75928e-16 1.5708
+-0.1349 0.0052 1.65232e-16  3.2474e-15 2.86219e-15 -1.5708
+0 -0.0611 0.0181  1.5708 -9.38083e-08 3.14159
+-0.0079 -0.000218121 -0.0981274  1.5708 1.22465e-16 1.5708"""
+"""Joints' origins, xyz and rpy, and the tool's: TheRobotStudio/SO-ARM100, Simulation/SO101/so101_new_calib.urdf."""
+
+
+def test_the_urdf_of_an_so101_is_one_as_designed(tmp_path):
+    """Its right angles have five digits: dhkit says so, and reads them as right angles where it is told to."""
+    lines = ["<robot name='so101'>", *(f"<link name='l{k}'/>" for k in range(7))]
+    for k, origin in enumerate(SO101_ORIGINS.splitlines()):
+        xyz, rpy = origin.split("  ")
+        kind = "fixed" if k == 5 else "revolute"
+        lines += [
+            f"<joint name='j{k}' type='{kind}'><origin xyz='{xyz}' rpy='{rpy}'/>",
+            f"<parent link='l{k}'/><child link='l{k + 1}'/><axis xyz='0 0 1'/>",
+            "<limit lower='-2' upper='2' effort='10' velocity='10'/></joint>",
+        ]
+    path = tmp_path / "so101.urdf"
+    path.write_text("\n".join([*lines, "</robot>"]))
+    assert "are its angles rounded?" in str(Arm.from_urdf(path).family)
+    arm = Arm.from_urdf(path, as_designed=True)
+    q = np.random.default_rng(0).uniform(-1.5, 1.5, (200, 5))
+    found = arm.ik(arm.fk(q))
+    apart = np.abs(found.q - q[:, None]).max(axis=-1)
+    assert np.where(found.valid, apart, np.inf).min(axis=-1).max() < 1e-9
+
+
 @acceptance.only_accepting
 def test_right_angles_and_zeros():
     """Exact multiples of 45 degrees, where joints 1 and 5 are free or links are stretched."""
