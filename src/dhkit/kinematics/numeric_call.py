@@ -55,7 +55,7 @@ class NumericCall:
             "branches": ("numeric",),
             "met": ALL_COORDINATES,
             "description": description,
-            "complete": False,
+            "batch": (),
         }
         # At a solution, where rounding is not amplified.
         solution = newton.inside(newton.middle + 0.1)
@@ -105,12 +105,12 @@ class NumericCall:
         square = max(x * x + y * y + z * z, a * a + b * b + c * c)
         # False where the start is not finite.
         if square <= tolerance * tolerance:
-            return IKSolutions.of_packed(q, _FOUND, self._shared)
+            return IKSolutions.of_packed(q, _FOUND, self._shared, complete=False)
         with np.errstate(all="ignore"):
             restarted = self._restarted(T, first, tolerance, seed)
         if restarted is None:
             return None
-        return IKSolutions.of_packed(restarted[None], _FOUND, self._shared)
+        return IKSolutions.of_packed(restarted[None], _FOUND, self._shared, complete=False)
 
     def _few(self, T: Array, first: Any, tolerance: float, seed: int) -> IKSolutions | None:
         """Return the solutions of poses (N, 4, 4): searched for together, and restarted one by one."""
@@ -134,7 +134,8 @@ class NumericCall:
             if restarted is None:
                 return None
             q[k, 0] = restarted
-        return IKSolutions.of_packed(q, _FOUND * count, self._shared)
+        shared = {**self._shared, "batch": (count,)}
+        return IKSolutions.of_packed(q, _FOUND * count, shared, complete=False)
 
     def _restarted(self, T: Array, first: Array, tolerance: float, seed: int) -> Array | None:
         """Return the solution (n,) from further starts, the nearest to the first start of those found together."""

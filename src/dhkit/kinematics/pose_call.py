@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,18 +25,19 @@ _ZERO = bytes(8)
 """The distance 0.0 m, with which the packed outputs of a pose that is reached begin."""
 
 
-_REACHED = (IKStatus.ok, IKStatus.singular)
+_REACHED = (int(IKStatus.ok), int(IKStatus.singular))
+"""Status codes of poses with solutions: numbers, for a comparison with members of an enumeration takes longer."""
 
 
 class PoseCall:
     """All solutions of one pose or a few of an arm with a closed form, or None of what it does not take."""
 
     def __init__(self, description: Description, solver: Solver) -> None:
-        self.shared = {
+        self.shared: Mapping[str, object] = {
             "branches": solver.fit.branches,
             "met": solver.fit.coordinates,
             "description": description,
-            "complete": True,
+            "batch": (),
         }
         B = len(solver.fit.branches)
         # Distance, valid, flags and status.
@@ -71,10 +72,12 @@ class PoseCall:
             Array for the joint values, shape (..., B, n), rad and m.
         """
         no_seed = _NO_SEED
+        shared = self.shared
         if type(T) is np.ndarray and T.ndim == 3:
             if len(T) > MAX_ITEMS or T.shape[1:] != (4, 4):
                 return None
             no_seed = np.zeros((len(T), 2))
+            shared = {**shared, "batch": (len(T),)}
         if self._needs_reach and out is not None and _may_share_memory(T, out):
             # The ordinary way may still need T.
             return None
@@ -82,12 +85,17 @@ class PoseCall:
         if found is None:
             return None
         q, packed = found
-        solutions = IKSolutions.of_packed(q, packed, self.shared)
-        if self._needs_reach:
-            places = range(0, len(packed), self._pose_bytes)
-            if not all(packed.startswith(_ZERO, place) for place in places):
-                return None
-        return solutions
+        if self._needs_reach and not self._is_reached(packed):
+            return None
+        return IKSolutions.of_packed(q, packed, shared)
+
+    def _is_reached(self, packed: bytes) -> bool:
+        """Return whether all poses are reached."""
+        if len(packed) == self._pose_bytes:
+            return packed.startswith(_ZERO)
+        return all(
+            packed.startswith(_ZERO, place) for place in range(0, len(packed), self._pose_bytes)
+        )
 
 
 class RedundantCall:
@@ -95,7 +103,6 @@ class RedundantCall:
 
     def __init__(self, description: Description, solver: Solver) -> None:
         self._poses = PoseCall(description, solver)
-        self._shared = {**self._poses.shared, "complete": False}
 
     def compile(self) -> None:
         """Compile the function now."""
@@ -120,8 +127,8 @@ class RedundantCall:
         q, packed = found
         if packed[-1] not in _REACHED:
             return None
-        shared = {**self._shared, "redundancy": np.array(redundancy)}
-        return IKSolutions.of_packed(q, packed, shared)
+        shared = self._poses.shared
+        return IKSolutions.of_packed(q, packed, shared, False, np.array(redundancy))
 
 
 class EliminationCall:

@@ -91,8 +91,15 @@ class IKSolutions:
     """For arms of seven joints the redundancy of each pose's solutions, joint 7 or the arm angle, shape (...), rad."""
 
     @classmethod
-    def of_packed(cls, q: Array, packed: bytes, shared: Mapping[str, object]) -> IKSolutions:
-        """Return the solutions of few poses, whose other arrays are made when one of them is first read.
+    def of_packed(
+        cls,
+        q: Array,
+        packed: bytes,
+        shared: Mapping[str, object],
+        complete: bool = True,
+        redundancy: Array | None = None,
+    ) -> IKSolutions:
+        """Return the solutions of few poses, whose other fields are made when one of them is first read.
 
         Parameters
         ----------
@@ -101,13 +108,20 @@ class IKSolutions:
         packed
             Of each pose ``distance`` as a double, then B bytes of ``valid``, B of ``flags``, and ``status_code``.
         shared
-            The fields that are not arrays, by name.
+            ``branches``, ``met`` and ``description``, which are the same for all poses; and ``batch``, the shape of the
+            batch.
+        complete, redundancy
+            The fields of these names.
         """
         # Making an object as usual, and four arrays, would take longer than inverse kinematics.
         solutions = object.__new__(cls)
-        object.__setattr__(
-            solutions, "__dict__", {**shared, "q": q, "_packed": packed, "_batch": q.shape[:-2]}
-        )
+        own = solutions.__dict__
+        own["q"] = q
+        own["_packed"] = packed
+        own["_shared"] = shared
+        if not complete:
+            own["complete"] = False
+            own["redundancy"] = redundancy
         return solutions
 
     def with_later_distance(self, distance: Callable[[], Array]) -> IKSolutions:
@@ -129,10 +143,13 @@ class IKSolutions:
             # Of two threads that read first, both get the same array.
             return self.__dict__.setdefault(name, later())
         packed = self.__dict__.get("_packed")
-        if packed is None or name not in ("distance", "valid", "flags", "status_code"):
+        is_packed = name in ("distance", "valid", "flags", "status_code")
+        if packed is not None and name in ("branches", "met", "description"):
+            return self.__dict__["_shared"][name]
+        if packed is None or not is_packed:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        # The caller may have changed the shape of ``q`` meanwhile, which is the array given as out=.
-        batch = self.__dict__["_batch"]
+        # Not that of ``q``: the caller may have changed the shape of the array given as out= meanwhile.
+        batch = self.__dict__["_shared"]["batch"]
         B = len(self.branches)
         of_pose = [
             ("distance", np.float64),
