@@ -101,7 +101,7 @@ def problem_table() -> str:
         lines.append(f"| {' | '.join(map(str, cells))} |")
     arms = {row["robot"]: row["poses"] for row in rows}
     count = f"The {sum(arms.values())} poses of {len(arms)} arms"
-    place = "[benchmarks/problems](benchmarks/problems)"
+    place = "[benchmarks/problems](docs/how-to/benchmark-problems.md)"
     kinds = "regular, next to singularities and limits, and out of reach"
     lines.append(f"\n{count} in {place}: {kinds}.")
     return "\n".join(lines) + "\n"
