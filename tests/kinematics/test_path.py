@@ -230,3 +230,18 @@ def test_paths_are_the_same_whether_all_poses_are_known_or_one_after_the_other(
         assert together.branch == single.branch
         assert np.allclose(together.q, single.q, rtol=0, atol=1e-12, equal_nan=True)
         assert (together.switches, together.lost) == (single.switches, single.lost)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "puma560", "cobra600"])
+def test_a_branch_that_does_not_reach_is_never_taken(name):
+    """Joints with any number of turns: the start is far from all solutions, and some branches have none."""
+    arm = Arm.load(name)
+    q = np.random.default_rng(3).uniform(-3, 3, (300, arm.n))
+    for state in q:
+        T = arm.fk(state)[None]
+        path = arm.ik_path(T, np.zeros(arm.n), limits=False)
+        if not path.lost:
+            assert np.abs(arm.fk(path.q) - T).max() < 1e-8
+    jumping = arm.ik_path(arm.fk(q), q[0], limits=False)
+    reached = np.setdiff1d(np.arange(len(q)), jumping.lost)
+    assert np.abs(arm.fk(jumping.q[reached]) - arm.fk(q[reached])).max() < 1e-8

@@ -29,8 +29,6 @@ _MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
 _RESTARTS_AFTER_LOST = 7
 """Number of restarts of the search for a pose that comes after a lost one."""
-_FAR = 1e6
-"""Joint value that stands for none, rad or m, farther away than any."""
 _CHUNK = 4096
 """Poses whose branches are compared together, some 15 MB."""
 _WHOLE = 6
@@ -268,7 +266,7 @@ class _NearestBranch:
     """Shape (N, B)."""
     limits: bool
     q: Array
-    """Joint values inside the limits, shape (N, B, n); branches that are not usable are far away."""
+    """Joint values inside the limits, shape (N, B, n); those of branches that are not usable are 0."""
     turn: Array
     """2 pi for joints of which every whole turn, or several, are allowed, 0 for others, shape (n,), rad and m."""
     has_several: bool
@@ -290,7 +288,7 @@ class _NearestBranch:
         is_several = ~(is_endless | has_one_winding)
         turn = np.where(is_endless | is_several, math.tau, 0.0)
         wound = solutions.wound(solutions.q, q0, limits=limits)
-        q = np.where(usable[..., None], wound, _FAR)
+        q = np.where(usable[..., None], wound, 0.0)
         return cls(solutions, usable, limits, q, turn, bool(is_several.any()))
 
     def chained(self, at: Array) -> tuple[Array, list[int]] | None:
@@ -312,7 +310,9 @@ class _NearestBranch:
             steps = some[1:, None] - some[:-1, :, None]
             if self.has_turns:
                 steps -= self.turn * np.rint(steps / math.tau)
-            following = np.einsum("kabn,kabn->kab", steps, steps).argmin(axis=-1)
+            squares = np.einsum("kabn,kabn->kab", steps, steps)
+            is_usable = self.usable[begin + 1 : begin + 1 + len(steps), None]
+            following = np.where(is_usable, squares, np.inf).argmin(axis=-1)
             for nearest in following.tolist():
                 places.append(nearest[places[-1]])
         chosen = q[np.arange(len(q)), places]
@@ -335,7 +335,8 @@ class _NearestBranch:
         step = self.q[k] - at
         if self.has_turns:
             step -= self.turn * np.rint(step / math.tau)
-        best = int(np.einsum("bn,bn->b", step, step).argmin())
+        squares = np.einsum("bn,bn->b", step, step)
+        best = int(np.where(self.usable[k], squares, np.inf).argmin())
         return best, at + step[best]
 
 
