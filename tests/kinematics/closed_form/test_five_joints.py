@@ -1,11 +1,15 @@
-"""Arms of five joints: every pose that one reaches is solved; of others the position is kept and the turn is least."""
+"""Arms of five joints: every pose that one reaches is solved, and no other."""
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import acceptance
 from dhkit import Arm
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.arm_plane import ArmPlane
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -39,12 +43,6 @@ TILTED = SO101.with_base(
 ARMS = {arm.name: arm for arm in (SO101, SCORBOT, MODIFIED)} | {"tilted": TILTED}
 
 
-def turn_between(R, wanted):
-    """Return the angles between rotations (..., 3, 3), rad."""
-    relative = np.swapaxes(R, -1, -2) @ wanted
-    return Rotation.from_matrix(relative.reshape(-1, 3, 3)).magnitude().reshape(R.shape[:-2])
-
-
 def random_states(count, seed=0):
     return np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, 5))
 
@@ -53,7 +51,7 @@ def random_states(count, seed=0):
 @pytest.mark.parametrize("name", ARMS)
 def test_states_are_found_at_their_poses(name, law):
     arm = ARMS[name]
-    assert "closed form, 4 branches; meets x, y, z, roll, pitch" in str(arm.family)
+    assert str(arm.family).endswith("axis 5 across them: closed form, 4 branches")
     q = random_states(law.samples(1_000_000, 20_000))
     found = arm.ik(arm.fk(q))
     apart = 2 * np.abs(np.sin((found.q - q[:, None]) / 2)).max(axis=-1)
@@ -61,46 +59,73 @@ def test_states_are_found_at_their_poses(name, law):
     regular = ~(found.status == "singular")
     law.holds("regular states missed", int(np.sum(nearest[regular] > 1e-6)), 0, name)
     law.holds("poses without a solution", int(np.sum(~found.valid.any(axis=-1))), 0, name)
+    law.holds("closure by the reach", closure(arm, found, arm.fk(q)), 1e-11, name)
+
+
+def closure(arm, found, T):
+    """Return the largest error of all branches, lengths over the reach."""
+    pose, branch = np.nonzero(found.valid)
+    error = np.abs(arm.fk(found.q[pose, branch]) - T[pose])
+    error[:, :3, 3] /= arm.description.reach
+    return error.max()
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_the_position_is_kept_and_the_turn_least(name):
-    """The turn is the angle between axis 5 and the plane: all rotations with axis 5 in the plane turn by more."""
+def test_the_tool_may_be_on_axis_1(name):
+    """There the position leaves joint 1 free, and axis 5 decides."""
+    arm = ARMS[name]
+    q = random_states(400, seed=4)
+    for size in (0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-3):
+        for k in range(len(q)):
+            q[k, 1:3] = _over_axis_1(arm, q[k], size)
+        regular = np.isfinite(q).all(axis=1)
+        T = arm.fk(q[regular])
+        found = arm.ik(T, seed=q[regular])
+        apart = 2 * np.abs(np.sin((found.q - q[regular][:, None]) / 2)).max(axis=-1)
+        assert np.where(found.valid, apart, np.inf).min(axis=-1).max() < 1e-5, size
+        assert closure(arm, found, T) < 1e-9
+        q = random_states(400, seed=4)
+
+
+def _over_axis_1(arm, q, distance):
+    """Return joints 2 and 3 that put the foot of the tool's origin this far from axis 1 in the plane; NaN if none."""
+    plane = ArmPlane.of(Axes.of(arm.description))
+    fit = classify(arm.description).fit
+    foot = np.asarray(fit.parameters["foot"])
+    if fit.parameters["offset"]:
+        return q[1:3]
+
+    def place(joints):
+        T = arm.fk([0.0, *joints, *q[3:]])
+        return plane.coordinates(T[:3, 3] + T[:3, :3] @ foot)[0]
+
+    # Joint 2 alone, by bisection between two places on both sides.
+    q3 = q[2]
+    grid = np.linspace(-np.pi, np.pi, 25)
+    values = [place([q2, q3]) - distance for q2 in grid]
+    for low, high, a, b in zip(grid, grid[1:], values, values[1:], strict=False):
+        if a * b < 0:
+            return [brentq(lambda q2: place([q2, q3]) - distance, low, high, xtol=1e-16), q3]
+    return [np.nan, np.nan]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_other_poses_are_out_of_reach(name):
     arm = ARMS[name]
     T = arm.fk(random_states(300))
     T[:, :3, :3] = Rotation.random(300, random_state=1).as_matrix()
     found = arm.ik(T)
-    assert found.valid.any(axis=-1).mean() > 0.5
-    pose, branch = np.nonzero(found.valid & (found.status == "ok")[:, None])
-    q = found.q[pose, branch]
-    reached = arm.fk(q)
-    assert np.abs(reached[:, :3, 3] - T[pose, :3, 3]).max() < 1e-11 * arm.description.reach
-
-    # Axis 2, across the plane, and the wanted axis 5.
-    frames = arm.frames(q)
-    shift = 1 if name == "modified" else 0
-    across = frames[:, 1 + shift, :3, 2]
-    in_tool = np.swapaxes(reached[:, :3, :3], 1, 2) @ frames[:, 4 + shift, :3, 2, None]
-    wanted = (T[pose, :3, :3] @ in_tool)[..., 0]
-    least = np.abs(np.arcsin(np.clip(np.sum(wanted * across, axis=-1), -1, 1)))
-    turned = turn_between(reached[:, :3, :3], T[pose, :3, :3])
-    assert np.abs(turned - least).max() < 1e-7
+    assert not found.valid.any()
+    assert (found.status == "out_of_reach").all()
+    assert (found.distance > 0).all()
 
 
-def test_iteration_finds_no_nearer_pose_with_the_same_position():
-    arm = SCORBOT
-    rng = np.random.default_rng(2)
-    T = arm.fk(random_states(20, seed=2))
-    T[:, :3, :3] = Rotation.random(20, random_state=3).as_matrix()
-    found = arm.ik(T)
-    for pose, goal in zip(found.q, T, strict=True):
-        pose = pose[~np.isnan(pose).any(axis=1)]
-        if not len(pose):
-            continue
-        best = turn_between(arm.fk(pose)[:, :3, :3], goal[:3, :3]).min()
-        for _ in range(10):
-            q = arm.ik_numeric(goal, q0=rng.uniform(-3, 3, 5), position_only=True).q[0]
-            assert np.isnan(q).any() or turn_between(arm.fk(q)[:3, :3], goal[:3, :3]) > best - 1e-9
+def test_a_plane_that_does_not_hold_axis_5_does_not_reach():
+    """With the plane beside axis 1 only one of the two shoulders can turn it along axis 5."""
+    T = SO101.fk(random_states(100, seed=6))
+    found = SO101.ik(T)
+    assert closure(SO101, found, T) < 1e-12
+    assert (found.valid.sum(axis=-1) == 2).mean() > 0.9
 
 
 def test_poses_beyond_reach_and_none():
@@ -114,10 +139,6 @@ def test_poses_beyond_reach_and_none():
         "out_of_reach",
         "not_a_pose",
     ]
-    # Axis 5 across the plane: any direction in it is as near.
-    side = T.copy()
-    side[:3, :3] = Rotation.from_euler("y", 90, degrees=True).as_matrix()
-    assert np.isfinite(SO101.ik(side).distance)
 
 
 def test_a_path_of_five_joints_is_followed():

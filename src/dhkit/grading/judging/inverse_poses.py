@@ -116,9 +116,8 @@ class Poses:
             T,
             solutions=np.where(closed_form.valid[..., None], closed_form.q, np.nan),
             pose_parts=parts,
-            # The tool of a planar arm or a SCARA only turns about one axis: its yaw is its whole rotation. That of five
-            # joints turns about two, and the poses are made of joint values.
-            asks_rotation=len(parts) == 6 or "yaw" in parts or "roll" in parts,
+            # The tool of a planar arm or a SCARA only turns about one axis: its yaw is its whole rotation.
+            asks_rotation=len(parts) == 6 or "yaw" in parts,
             axis=next((_TOOL_AXES[part] for part in parts if part in _TOOL_AXES), None),
             lower=lower,
             upper=upper,

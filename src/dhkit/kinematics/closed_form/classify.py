@@ -128,8 +128,8 @@ def classify(description: Description) -> Classification:
         words = f"{kinds}, {fit.geometry}: closed form, {branches}{met}"
         exactly = _first(Axes.of(description, _EXACT_MEMBER))
         is_exact = exactly is not None and exactly[0] is family
-        meets_all = fit.coordinates == ALL_COORDINATES
-        return Classification(words, family, fit, found if meets_all and not is_exact else None)
+        is_refined = _has_neighbours(axes, fit) and not is_exact
+        return Classification(words, family, fit, found if is_refined else None)
     redundant = _first(axes, REDUNDANT)
     if redundant is not None:
         family, fit = redundant
@@ -142,8 +142,13 @@ def classify(description: Description) -> Classification:
         words += " as_designed=True (--as-designed) reads them as right angles)"
     elif kinds in _ELIMINATED:
         words += f", solved by elimination{_ELIMINATED[kinds]}"
-    meets_all = near is not None and near[1].coordinates == ALL_COORDINATES
-    return Classification(words, None, None, near if meets_all else None)
+    is_solved = near is not None and _has_neighbours(axes, near[1])
+    return Classification(words, None, None, near if is_solved else None)
+
+
+def _has_neighbours(axes: Axes, fit: Fit) -> bool:
+    """Return whether arms that miss the family a little are solved from its members: those of six joints."""
+    return axes.n == len(ALL_COORDINATES) and fit.coordinates == ALL_COORDINATES
 
 
 def _nearest_family(description: Description) -> tuple[Family, Fit] | None:

@@ -1,15 +1,14 @@
 """Arms of five joints: a turntable, three parallel axes, and a last axis that rolls the tool in the arm's plane.
 
-Most small arms for teaching are of this kind (SO-100 and SO-101, ScorBot, many toys). Axis 5 stays in a plane parallel
-to that of the arm, so that a pose is reached where the position lets joint 1 turn this plane along the wanted direction
-of axis 5. Of other poses the nearest one with the same position is given: the wanted rotation, turned by the least
-angle that brings axis 5 into the plane.
+Most small arms for teaching are of this kind (SO-100 and SO-101, ScorBot, many toys). Axis 5 stays in the arm's plane,
+so that five of a pose's six coordinates can be chosen: joint 1 turns the plane along the wanted axis 5, and through its
+foot, the point nearest to the tool's origin. Both conditions must give the same plane.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,29 +24,30 @@ from dhkit.kinematics.closed_form.arm_plane import (
 )
 from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
-    BOUNDARY_SHARE,
     SINGULAR,
     SX,
     Branch,
     Pair,
     add_angles,
     angle,
-    clamp,
     fabs,
+    fmax,
     hypot,
     if_else,
+    logic_and,
     logic_or,
+    select_pair,
+    sign,
     unit_pair,
     weighted_sum,
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
-_STEPS = 6
-"""Newton steps of joint 1: none changes anything where the pose is reached, or the tool's origin is on axis 5."""
-_LARGEST_STEP = 0.3
-"""Largest such step, rad."""
-_CLOSED = 16 * BOUNDARY_SHARE
-"""Share of ``scale`` by which the last step may miss: it ends at rounding, or has not converged."""
+_WELL_CONDITIONED = 1e-3
+"""Share of the horizontal part of axis 5 that the foot's distance along the plane needs, over ``scale``, to decide."""
+OFF_PLANE = 1e-9
+"""Sine of an angle, or share of ``scale``, by which axis 5 may lie off the arm's plane: a pose that misses it by more
+is out of reach."""
 
 
 def five_joints_fit(axes: Axes) -> Fit | None:
@@ -63,11 +63,8 @@ def five_joints_fit(axes: Axes) -> Fit | None:
         return None
     direction = axes.direction(5)
     tool = axes.T_world_tool[:3, 3]
-    # The point of axis 5 nearest to the tool's origin, which is at e from it.
+    # The point of axis 5 nearest to the tool's origin.
     foot = axes.point(5) + direction * (direction @ (tool - axes.point(5)))
-    e = tool - foot
-    if np.linalg.norm(e) <= axes.tolerance * axes.scale:
-        e = np.zeros(3)
     to_tool = axes.T_world_tool[:3, :3].T
     along = plane.R @ direction
     offset = axes.snapped(plane.coordinates(foot)[2])
@@ -79,50 +76,45 @@ def five_joints_fit(axes: Axes) -> Fit | None:
         "lever": plane.coordinates(foot)[:2] - plane.coordinates(axes.point(4))[:2],
         "pointing": as_pair(along[0], along[1]),
         "sense4": axes.sense(2, 4),
-        # In the tool's frame: axis 5, the vector e, and the direction that is across the plane at zero joint positions.
+        # In the tool's frame: axis 5, the foot, and the direction that is across the plane at zero joint positions.
         "axis": to_tool @ direction,
-        "beside": to_tool @ e,
+        "foot": to_tool @ (foot - tool),
         "across": to_tool @ plane.R[2],
     }
     return Fit(
         geometry="a turntable, axes 2, 3 and 4 parallel, axis 5 across them",
         parameters=links | own,
         branches=branch_names(offset, ELBOWS),
-        coordinates=("x", "y", "z", "roll", "pitch"),
     )
 
 
 def five_joints_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return the four branches that put the tool's origin in place and turn it as near as possible.
+    """Return the four branches: shoulder, then elbow. A shoulder whose plane does not hold axis 5 does not reach.
 
-    In the arm's plane at q1 the wanted axis 5 is a = c u + s v, with v across the plane and u in it. The least rotation
-    Q that takes it to u takes (v - s a) / c to v, and keeps w = u x v. The foot of the tool's origin on axis 5 is then
-    at x - Q e, and its coordinate across the plane, x_v - e_v / c, must be the offset of axis 5: an equation for q1.
+    The direction w of axis 5 in the arm's plane gives the rotation of links 2 to 4, and with it the position of axis 4,
+    which two links reach from axis 2, as for four joints:
+
+        rho = q2 + q3 + q4 = arg(w) - pointing,    axis 4 at the foot - e^(i rho) lever.
+
+    Joint 5 is the angle from v, across the plane, to what is across it at zero joint positions.
     """
     T = pose.seen(p["T_plane_world"], np.eye(4)[:3])
     axis = weighted_sum(p["axis"], T.rotation)
-    beside = weighted_sum(p["beside"], T.rotation)
     across = weighted_sum(p["across"], T.rotation)
-    # Where the pose is reached, Q is 1.
-    x, y, z = (here - there for here, there in zip(T.position, beside, strict=True))
+    beside = weighted_sum(p["foot"], T.rotation)
+    x, u, v = (here + there for here, there in zip(T.position, beside, strict=True))
     branches = []
-    for first in ordered_shoulders(p, (x, y, z), pose):
-        shoulder = _turned(p, first, T.position, axis, beside, pose)
-        seen = _Seen.at(shoulder.q1, axis)
-        rho = add_angles(seen.along, p["pointing"], -1.0)
+    for shoulder in _planes(p, (x, u, v), axis, pose):
+        seen = to_arm_frame(axis, shoulder.q1)
+        along = unit_pair(seen[0], seen[1])
+        rho = add_angles(along, p["pointing"], -1.0)
         lever = add_angles(rho, p["lever"])
-        tool = to_arm_frame(T.position, shoulder.q1)
-        # Q e in the plane is its component along w = (u_u, -u_x).
-        _, e_w = seen.across(beside)
-        foot_x = tool[0] - e_w * seen.along[1]
-        foot_u = tool[1] + e_w * seen.along[0]
-        sideways = seen.c < SINGULAR
 
-        # Turned about u, v goes to w: joint 5 is the angle from v to what is across the plane at zero.
-        q5 = angle(unit_pair(*seen.across(across)))
-        for elbow in elbows(
-            p, foot_x - p["a1"] - lever[0], foot_u - lever[1], shoulder.q1, pose.scale
-        ):
+        # Turned about w, v goes to w x v = (w_u, -w_x).
+        side = to_arm_frame(across, shoulder.q1)
+        q5 = angle(unit_pair(side[2], side[0] * along[1] - side[1] * along[0]))
+        end = (shoulder.x - p["a1"] - lever[0], u - lever[1])
+        for elbow in elbows(p, *end, shoulder.q1, pose.scale):
             rest = add_angles(rho, elbow.rotation, -1.0)
             q4 = angle((rest[0], p["sense4"] * rest[1]))
             branches.append(
@@ -131,73 +123,48 @@ def five_joints_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]
                     miss=hypot(shoulder.miss, elbow.miss),
                     shoulder=shoulder.singular,
                     elbow=elbow.singular,
-                    wrist=sideways,
+                    wrist=0.0,
                     clamped=logic_or(shoulder.clamped, elbow.clamped),
                 )
             )
     return branches
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """The wanted axis 5 in the axes (x, u, v) of the arm's plane."""
+def _planes(p: Mapping[str, SX], foot: Vector, axis: Vector, pose: PoseSymbols) -> list[Shoulder]:
+    """Return the two positions of joint 1 that bring the plane through the foot, or along axis 5.
 
-    q1: Pair
-    axis: Vector
-    along: Pair
-    """Its direction in the plane."""
-    c: SX
-    """Cosine of its angle with the plane."""
-
-    @classmethod
-    def at(cls, q1: Pair, axis: Vector) -> _Seen:
-        """Return the axis at joint 1 = q1, from its coordinates with joint 1 at zero."""
-        seen = to_arm_frame(axis, q1)
-        return cls(q1, seen, unit_pair(seen[0], seen[1]), hypot(seen[0], seen[1]))
-
-    def across(self, vector: Vector) -> tuple[SX, SX]:
-        """Return the components along v and w of a vector that is at right angles to the axis, turned by Q."""
-        x, u, v = to_arm_frame(vector, self.q1)
-        along_x, along_u = self.along
-        return v / self.c, x * along_u - u * along_x
-
-
-def _turned(
-    p: Mapping[str, SX],
-    shoulder: Shoulder,
-    position: Vector,
-    axis: Vector,
-    beside: Vector,
-    pose: PoseSymbols,
-) -> Shoulder:
-    """Return a shoulder with joint 1 where the foot of the tool's origin is at axis 5, by Newton's method.
-
-    With joint 1, v components change by x components, and those by -v:
-
-        f = x_v - e_v / c - offset,    f' = x_x - e_x / c - e_v s a_x / c^3,    c^2 = 1 - s^2,  s = a_v.
+    The foot decides, unless it is so near to axis 1 that q1 hardly moves it across the plane: then axis 5 does. The
+    other condition is checked.
     """
-    q1 = shoulder.q1
-    is_reached = shoulder.miss <= 0.0
+    horizontal = hypot(axis[0], axis[2])
+    scale = pose.scale
+    found = []
+    for shoulder in ordered_shoulders(p, foot, pose):
+        by_foot = fabs(shoulder.x) >= _WELL_CONDITIONED * horizontal * scale
+        q1 = select_pair(by_foot, shoulder.q1, _along(axis, shoulder))
+        seen = to_arm_frame(axis, q1)
+        here = to_arm_frame(foot, q1)
+        # The foot is in front of axis 1, or behind it, as the shoulder has it.
+        aside = fmax(fabs(here[2] - p["offset"]), -here[0] * sign(shoulder.x))
+        off = fmax(fabs(seen[2]), aside / scale)
+        found.append(
+            replace(
+                shoulder,
+                q1=q1,
+                x=if_else(by_foot, shoulder.x, here[0]),
+                miss=if_else(off > OFF_PLANE, fmax(off * scale, shoulder.miss), 0.0),
+                singular=logic_and(shoulder.singular, horizontal < SINGULAR),
+            )
+        )
+    return found
 
-    def residual(q1: Pair) -> tuple[SX, SX]:
-        x = to_arm_frame(position, q1)
-        e = to_arm_frame(beside, q1)
-        a = to_arm_frame(axis, q1)
-        c = hypot(a[0], a[1])
-        f = x[2] - e[2] / c - p["offset"]
-        return f, x[0] - e[0] / c - e[2] * a[2] * a[0] / (c * c * c)
 
-    for _ in range(_STEPS):
-        f, slope = residual(q1)
-        step = clamp(-f / slope, -_LARGEST_STEP, _LARGEST_STEP)
-        # NaN where axis 5 is across the plane, or the tool over axis 1.
-        half = if_else(fabs(step) <= _LARGEST_STEP, step / 2.0, 0.0)
-        # The angle 2 arctan(step / 2), which is the step up to its cube.
-        over = 1.0 / (1.0 + half * half)
-        turned = add_angles(q1, ((1.0 - half * half) * over, 2.0 * half * over))
-        q1 = (if_else(is_reached, turned[0], q1[0]), if_else(is_reached, turned[1], q1[1]))
+def _along(axis: Vector, shoulder: Shoulder) -> Pair:
+    """Return joint 1 along the horizontal part of axis 5: of its two angles the one nearer to the shoulder's.
 
-    f, _ = residual(q1)
-    has_closed = fabs(f) <= _CLOSED * pose.scale
-    missed = if_else(has_closed, 0.0, fabs(f))
-    return replace(shoulder, q1=q1, miss=if_else(is_reached, missed, shoulder.miss))
+    a_v = s1 a_x + c1 a_v at q1 is 0 where (c1, s1) is along +-(a_x, -a_v).
+    """
+    first = unit_pair(axis[0], -axis[2])
+    near = shoulder.q1
+    is_near = first[0] * near[0] + first[1] * near[1] >= 0.0
+    return select_pair(is_near, first, (-first[0], -first[1]))

@@ -21,6 +21,8 @@ SAMPLES = 20
 """Number of values. 17 would do; the other coefficients then tell how exactly the values are a polynomial's."""
 _LARGEST_ANGLE = 3.5
 """No root has a larger angle, rad; the program writes 4 for a root that is not nearly real."""
+_WELL_KNOWN = 1e-12
+"""Error of the coefficients above which every root that is nearly real counts as one; usually it is some 1e-15."""
 _NO_PARAMETERS = np.zeros(1)
 
 
@@ -39,7 +41,7 @@ class Roots:
     """The root's real part, shape (K,), rad, in [-pi, pi], less the first angle."""
     expected: NDArray[np.intp]
     """Number of roots of each polynomial that are real up to their errors, shape (N,); at least 1 if some are nearly
-    real."""
+    real, and all that are nearly real if the polynomial is not well known."""
     is_delicate: NDArray[np.bool_]
     """Whether two real roots of a polynomial nearly coincide, shape (N,)."""
     error: Array
@@ -67,7 +69,9 @@ def real_roots(values: Array) -> Roots:
     # NaN, where values are not finite, is no root.
     is_near = angle < _LARGEST_ANGLE
     owner, _ = np.nonzero(is_near)
-    counts = np.count_nonzero(is_near & (is_real > 0), axis=1)
+    # Near poses at several singularities the coefficients cancel, and roots that are real may look complex.
+    is_counted = is_near & ((is_real > 0) | (error > _WELL_KNOWN))
+    counts = np.count_nonzero(is_counted, axis=1)
     expected = np.maximum(counts, is_near.any(axis=1))
     return Roots(owner, angle[is_near], expected, is_delicate[:, 0] > 0, error[:, 0])
 
