@@ -425,6 +425,15 @@ def test_a_process_judges_sheets_of_another_machine(tmp_path):
     assert report.error.startswith(f"{path}: ")
 
 
+def test_a_robot_file_is_not_sent_along(tmp_path):
+    path = tmp_path / "answer.toml"
+    path.write_text('format = 1\nrobot = "arm.toml"\n[answer]\nV = "0"\n')
+    report = report_of(judged_elsewhere(task_of(path, replace(JUDGE, robot=None))))
+    assert report.error == (
+        f"{path}: arm.toml: no such file; no other files are sent to a cluster: give --robot, or a task with a robot"
+    )
+
+
 def test_a_process_for_sheets_ends_with_its_program_or_when_it_is_idle():
     program = "from dhkit.grading import judge_process as p; p.IDLE_SECONDS = 0.1; p.serve()"
     for stdin in (subprocess.DEVNULL, subprocess.PIPE):

@@ -305,6 +305,14 @@ def test_equal_records_of_two_students_are_named(capsys):
     assert rows()[1]["notes"].endswith("began and ended at the same seconds as class/ada.lab.json")
 
 
+def test_totals_count_one_sheet_and_one_record_of_a_student():
+    text = record("Dora", UP, REACH)
+    write("class", **{"dora/a.lab.json": text, "dora/b.lab.json": text, "dora/answer.py": RIGHT})
+    write("class", **{"dora/answer.m": HALF.replace("\n", ";\n")})
+    grade("class", "-o", "out")
+    assert rows(table="totals.csv") == [{"student": "dora", "points": "25", "most": "30"}]
+
+
 def test_totals_of_a_run_with_a_lab_do_not_stay_after_one_without():
     write_class()
     assert grade("class", "-o", "out") == 1

@@ -293,3 +293,33 @@ def test_every_published_table_is_solved(published, law):
         law.holds(
             "closure by the reach, tables", closure(arm, found, T) / arm.description.reach, 1e-10
         )
+
+
+def test_a_pose_far_beyond_leaves_the_others_complete():
+    arm = Arm.load("jaco")
+    T = arm.fk(np.random.default_rng(0).uniform(-2, 2, (3, 6)))
+    assert arm.ik(T).complete
+    T[1, :3, 3] = 1e6
+    found = arm.ik(T)
+    assert found.complete
+    assert found.status.tolist() == ["ok", "out_of_reach", "ok"]
+
+
+def test_nearly_folded_wrists_are_complete_or_said_not_to_be():
+    """There the polynomial's coefficients cancel: roots that are real may look complex."""
+    arm = SIX["FANUC CRX-10iA"]
+    rng = np.random.default_rng(0)
+    count = 60
+    quarter = rng.integers(-3, 5, (count, 6)) * np.pi / 4
+    q = quarter.copy()
+    q[:, 1] = np.pi * rng.integers(0, 2, count)
+    q[:, 2] = np.pi / 2
+    q[:, 4] = np.pi * rng.integers(0, 2, count)
+    q += 10 ** rng.uniform(-4, -2, (count, 1)) * rng.normal(size=(count, 6))
+    for state in q:
+        smallest = np.linalg.svd(arm.jacobian(state))[1][-1]
+        if smallest < 1e-5 * arm.description.reach:
+            continue
+        found = arm.ik(arm.fk(state))
+        apart = 2 * np.abs(np.sin((found.q - state) / 2)).max(axis=-1)
+        assert not found.complete or np.nanmin(apart) < 1e-4

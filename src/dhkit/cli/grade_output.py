@@ -228,7 +228,7 @@ def _write_folder(
 ) -> None:
     """Write the files of a class: marks, a page and full records for the teacher, and a page for each student.
 
-    With lab records a student may have several rows that count: a table of totals has their sums.
+    With lab records a student's work has two parts: a table of totals has their sums.
 
     Results of an earlier run in the folder are removed.
 

@@ -29,6 +29,7 @@ from dhkit.grading.sheets import Sheet
 
 IDLE_SECONDS = 60.0
 """Time after which a process without a task ends, s: a cluster may live for days after a class was graded."""
+_ALONE = "no other files are sent to a cluster: give --robot, or a task with a robot"
 PROGRAM = "from dhkit.grading.judge_process import serve; serve()"
 
 
@@ -89,6 +90,9 @@ class JudgeTask:
                     memory=self.memory,
                     prepare=judge.prepare,
                 )
+                if folder in report.error:
+                    beside = report.error.replace(f"{folder}{os.sep}", "")
+                    report = replace(report, error=f"{self.sheet.name}: {beside}; {_ALONE}")
         except (DhkitError, OSError) as error:
             return GradeReport(error=f"{self.sheet.name}: {error}")
         return report

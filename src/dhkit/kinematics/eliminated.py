@@ -11,7 +11,12 @@ from dhkit.description import Array, Description
 from dhkit.errors import ModelError
 from dhkit.kernels import Kernel, pose_rows
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import are_poses, collect, orthonormal
+from dhkit.kinematics.candidates import (
+    are_poses,
+    collect,
+    is_beyond_all_links,
+    orthonormal,
+)
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.closed_form.formulas import SINGULAR
@@ -74,6 +79,8 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     none_exist = np.zeros(posed.size, dtype=bool)
     if not has_curves(description):
         none_exist[rows] = found.is_complete & (found.counts == 0)
+    # The polynomial of a pose far beyond all links is not well known, but it has no solution.
+    is_known = found.is_complete | is_beyond_all_links(description, goals[:, :3, 3])
     return collect(
         description,
         table.reshape(*poses.shape[:-2], B, description.n),
@@ -83,7 +90,7 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
         branches=tuple(f"solution {k + 1}" for k in range(B)),
         met=ALL_COORDINATES,
         flags=flags.reshape(*poses.shape[:-2], B),
-        complete=bool(found.is_complete.all()) and not has_curves(description),
+        complete=bool(is_known.all()) and not has_curves(description),
         none_exist=none_exist.reshape(posed.shape),
     )
 

@@ -122,10 +122,10 @@ def _lab_cells(report: GradeReport, equal: GradeReport | None) -> tuple[str, str
 
 
 def totals_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
-    """Return the points of each student as CSV text, in the order of their first rows: sums of the rows of marks.
+    """Return the points of each student as CSV text, in the order of their first rows.
 
-    Sheets and lab records are two parts of the whole. A student without one of them has no points for it, out of those
-    that the others could get.
+    Sheets and lab records are two parts of the whole, and of each part the file with the most points counts. A student
+    without one of them has no points for it, out of those that the others could get.
 
     Parameters
     ----------
@@ -133,18 +133,17 @@ def totals_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
         Reports and marks of all rows that count.
     """
     most_of_part: dict[bool, float] = {}
-    rows: dict[str, list[tuple[bool, Marks]]] = {}
+    best: dict[str, dict[bool, float]] = {}
     for report, of_file in zip(reports, marks, strict=True):
         part = report.is_lab_record
         most_of_part[part] = max(of_file.most, most_of_part.get(part, 0.0))
-        rows.setdefault(report.student, []).append((part, of_file))
+        own = best.setdefault(report.student, {})
+        own[part] = max(of_file.points, own.get(part, 0.0))
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(TOTALS_COLUMNS)
-    for student, own in rows.items():
-        handed_in = {part for part, _ in own}
-        missing = [most for part, most in most_of_part.items() if part not in handed_in]
-        got = fsum(of_file.points for _, of_file in own)
-        most = fsum([*(of_file.most for _, of_file in own), *missing])
+    most = fsum(most_of_part.values())
+    for student, of_parts in best.items():
+        got = fsum(of_parts.values())
         writer.writerow([cell(plain(student)), points(got), points(most)])
     return file.getvalue()
