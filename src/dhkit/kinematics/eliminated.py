@@ -76,11 +76,13 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     is_delicate = np.zeros(posed.size, dtype=bool)
     is_delicate[rows] = found.is_delicate
     flags = _singular_flags(description, table, is_delicate)
+    is_known = found.is_complete
     none_exist = np.zeros(posed.size, dtype=bool)
     if not has_curves(description):
-        none_exist[rows] = found.is_complete & (found.counts == 0)
-    # The polynomial of a pose far beyond all links is not well known, but it has no solution.
-    is_known = found.is_complete | is_beyond_all_links(description, goals[:, :3, 3])
+        none_exist[rows] = is_known & (found.counts == 0)
+    if not is_known.all():
+        # The polynomial of a pose far beyond all links is not well known, but it has no solution.
+        is_known |= is_beyond_all_links(description, goals[:, :3, 3])
     return collect(
         description,
         table.reshape(*poses.shape[:-2], B, description.n),
