@@ -1730,10 +1730,9 @@ class Arm:
         base
             Whether the columns are those of the base parameters, in the order of ``base_parameters().names``.
         out
-            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given. Not for
-            base parameters.
+            Array that receives the result, float64, C-contiguous, of the shape below; a new array unless given.
         threads
-            Number of threads that share a large batch. Not for base parameters.
+            Number of threads that share a large batch.
 
         Returns
         -------
@@ -1765,13 +1764,13 @@ class Arm:
         >>> arm.regressor(*motion, base=True).shape
         (2, 6)
         """
-        if base:
-            return self.base_parameters().regressor(q, qd, qdd)
-        if threads is _ONE_THREAD and (Y := self._calls.regressor(q, qd, qdd, out)) is not None:
+        call = self._calls.base_regressor if base else self._calls.regressor
+        if threads is _ONE_THREAD and (Y := call(q, qd, qdd, out)) is not None:
             return Y
-        from dhkit.dynamics import regressor
+        from dhkit.dynamics import base_regressor, regressor
 
-        return regressor(self._description, q, qd, qdd, out, threads)
+        of_arm = base_regressor if base else regressor
+        return of_arm(self._description, q, qd, qdd, out, threads)
 
     def inverse_dynamics_derivatives(
         self,

@@ -9,8 +9,12 @@ from typing import Any, NamedTuple, TypeAlias
 from dhkit.description import Array, Description
 from dhkit.dynamics.derivatives import ForwardDynamicsDerivatives, InverseDynamicsDerivatives
 from dhkit.dynamics.programs import dynamics_kernel
-from dhkit.dynamics.regressor import regressor_kernel
-from dhkit.errors import DescriptionError
+from dhkit.dynamics.regressor import (
+    base_parameter_count,
+    base_regressor_kernel,
+    regressor_kernel,
+)
+from dhkit.errors import DhkitError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import (
@@ -34,48 +38,55 @@ PoseCallLike: TypeAlias = Callable[..., IKSolutions | None]
 
 class _Quantity(NamedTuple):
     kernel: Callable[[Description], tuple[Kernel, Array]]
-    tail: Callable[[int], tuple[int, ...]]
-    """Axes of the result after those of the batch, for n joints."""
+    tail: Callable[[Description], tuple[int, ...]]
+    """Axes of the result after those of the batch."""
     refuses_nan: bool = False
     result_of: Callable[[Array], Any] | None = None
     """What the arm's method returns, from the function's array; the array itself if None."""
 
 
 def _dynamic(
-    name: str, tail: Callable[[int], tuple[int, ...]], refuses_nan: bool = False
+    name: str, tail: Callable[[Description], tuple[int, ...]], refuses_nan: bool = False
 ) -> _Quantity:
     return _Quantity(partial(dynamics_kernel, name), tail, refuses_nan)
 
 
 _QUANTITIES: Mapping[str, _Quantity] = {
     "fk": _Quantity(tool_kernel, lambda _: (4, 4)),
-    "frames": _Quantity(frames_kernel, lambda n: (n + 1, 4, 4)),
-    "jacobian": _Quantity(lambda arm: jacobian_kernel(arm, "world"), lambda n: (6, n)),
-    "jacobian_dot": _Quantity(lambda arm: jacobian_dot_kernel(arm, "world"), lambda n: (6, n)),
-    "jacobian_derivative": _Quantity(
-        lambda arm: jacobian_derivative_kernel(arm, "world"), lambda n: (n, 6, n)
+    "frames": _Quantity(frames_kernel, lambda arm: (arm.n + 1, 4, 4)),
+    "jacobian": _Quantity(lambda arm: jacobian_kernel(arm, "world"), lambda arm: (6, arm.n)),
+    "jacobian_dot": _Quantity(
+        lambda arm: jacobian_dot_kernel(arm, "world"), lambda arm: (6, arm.n)
     ),
-    "mass_matrix_derivative": _dynamic("mass_matrix_derivative", lambda n: (n, n, n)),
-    "mass_matrix": _dynamic("mass_matrix", lambda n: (n, n)),
-    "coriolis_matrix": _dynamic("coriolis_matrix", lambda n: (n, n)),
-    "gravity_torque": _dynamic("gravity_torque", lambda n: (n,)),
-    "bias": _dynamic("bias", lambda n: (n,)),
-    "inverse_dynamics": _dynamic("inverse_dynamics", lambda n: (n,)),
-    "regressor": _Quantity(regressor_kernel, lambda n: (n, 10 * n)),
+    "jacobian_derivative": _Quantity(
+        lambda arm: jacobian_derivative_kernel(arm, "world"), lambda arm: (arm.n, 6, arm.n)
+    ),
+    "mass_matrix_derivative": _dynamic("mass_matrix_derivative", lambda arm: (arm.n, arm.n, arm.n)),
+    "mass_matrix": _dynamic("mass_matrix", lambda arm: (arm.n, arm.n)),
+    "coriolis_matrix": _dynamic("coriolis_matrix", lambda arm: (arm.n, arm.n)),
+    "gravity_torque": _dynamic("gravity_torque", lambda arm: (arm.n,)),
+    "bias": _dynamic("bias", lambda arm: (arm.n,)),
+    "inverse_dynamics": _dynamic("inverse_dynamics", lambda arm: (arm.n,)),
+    "regressor": _Quantity(regressor_kernel, lambda arm: (arm.n, 10 * arm.n)),
+    "base_regressor": _Quantity(
+        base_regressor_kernel, lambda arm: (arm.n, base_parameter_count(arm))
+    ),
     "inverse_dynamics_derivatives": _Quantity(
         partial(dynamics_kernel, "inverse_dynamics_derivatives"),
-        lambda n: (3, n, n),
+        lambda arm: (3, arm.n, arm.n),
         result_of=InverseDynamicsDerivatives.of,
     ),
     "forward_dynamics_derivatives": _Quantity(
         partial(dynamics_kernel, "forward_dynamics_derivatives"),
-        lambda n: (3, n, n),
+        lambda arm: (3, arm.n, arm.n),
         result_of=ForwardDynamicsDerivatives.of,
     ),
     # The ordinary way says why an acceleration is missing.
-    "forward_dynamics": _dynamic("forward_dynamics", lambda n: (n,), refuses_nan=True),
+    "forward_dynamics": _dynamic("forward_dynamics", lambda arm: (arm.n,), refuses_nan=True),
 }
 """Quantities by the name of the arm's method, for its default options."""
+_SLOW_TO_DERIVE = ("base_regressor",)
+"""Quantities that need the symbolic equations of motion: seconds for some arms."""
 
 
 def _with_result(call: FastCall, result_of: Callable[[Array], Any]) -> FastCall:
@@ -107,6 +118,7 @@ class ArmCalls:
     inverse_dynamics: ArrayCall
     forward_dynamics: ArrayCall
     regressor: ArrayCall
+    base_regressor: ArrayCall
     inverse_dynamics_derivatives: Callable[..., InverseDynamicsDerivatives | None]
     forward_dynamics_derivatives: Callable[..., ForwardDynamicsDerivatives | None]
     ik: PoseCallLike
@@ -134,8 +146,10 @@ class ArmCalls:
         return function
 
     def compile(self) -> Iterator[str]:
-        """Compile every quantity now, and yield its name."""
+        """Compile every quantity now, but for those that are slow to derive, and yield its name."""
         for name in _QUANTITIES:
+            if name in _SLOW_TO_DERIVE:
+                continue
             call = self._single_call(name)
             if call is not None:
                 call.compile()
@@ -151,7 +165,7 @@ class ArmCalls:
 
     def count(self) -> int:
         """Return the number of quantities."""
-        return len(_QUANTITIES) + 2
+        return len(_QUANTITIES) - len(_SLOW_TO_DERIVE) + 2
 
     def _install(self, name: str, call: FastCall) -> None:
         result_of = _QUANTITIES[name].result_of
@@ -160,16 +174,16 @@ class ArmCalls:
         setattr(self, name, call)
 
     def _single_call(self, name: str) -> SingleCall | None:
-        """Return a quantity that is not compiled yet; None of dynamics without bodies, whose ordinary way says so."""
+        """Return a quantity that is not compiled yet; None where the ordinary way says why not."""
         quantity = _QUANTITIES[name]
         try:
             kernel, parameters = quantity.kernel(self._description)
-        except DescriptionError:
+        except DhkitError:
             return None
         return SingleCall(
             kernel,
             parameters,
-            quantity.tail(self._description.n),
+            quantity.tail(self._description),
             install=partial(self._install, name),
             refuses_nan=quantity.refuses_nan,
         )

@@ -10,6 +10,7 @@ from acceptance import slow_if
 from dhkit import Arm
 from dhkit.description import from_dh, library_robot
 from dhkit.dynamics import inertial_parameters, inverse_dynamics, parameter_grouping, regressor
+from dhkit.errors import DescriptionError
 from dhkit.model import pinocchio_model
 from dhkit.symbolic import lagrangian
 from dhkit.symbolic.exact.regressor import regressor as exact_regressor
@@ -111,6 +112,26 @@ def test_columns_of_base_parameters_are_independent(name):
     # Without drives, the number is that of the numeric grouping.
     without = [parameter for parameter in base.names if not parameter.startswith(("Ia", "Ic"))]
     assert len(without) == len(parameter_grouping(arm))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_base_regressor_is_that_of_the_exact_equations(name):
+    """The compiled columns come from the numeric regressor, these from the proved equations of motion."""
+    arm = Arm.load(name)
+    motion = random_motions(arm.description, 50)
+    exact = arm.base_parameters().regressor(*motion)
+    compiled = arm.regressor(*motion, base=True)
+    assert largest(compiled - exact) <= RELATIVE_TOLERANCE * largest(exact)
+
+    out = np.empty_like(compiled)
+    assert arm.regressor(*motion, base=True, out=out, threads=2) is out
+    assert largest(out - compiled) <= RELATIVE_TOLERANCE * largest(exact)
+
+
+def test_base_regressor_says_what_is_missing():
+    arm = Arm(from_dh([(0, 0.1, 0.3, "pi/2"), (0, 0, 0.2, 0)], kinds="RP"))
+    with pytest.raises(DescriptionError, match="bod"):
+        arm.regressor([0, 0], [0, 0], [0, 0], base=True)
 
 
 def test_base_regressor_takes_batches_and_refuses_bad_input():

@@ -18,7 +18,7 @@ from dhkit.dynamics.equations import (
 from dhkit.dynamics.forward import forward_dynamics, require_inertia
 from dhkit.dynamics.loads import friction_torque, wrench_torque
 from dhkit.dynamics.programs import dynamic_kernels, dynamics_graph
-from dhkit.dynamics.regressor import inertial_parameters, regressor
+from dhkit.dynamics.regressor import base_regressor, inertial_parameters, regressor
 from dhkit.dynamics.velocity_regressor import (
     ParameterGrouping,
     parameter_grouping,
@@ -31,6 +31,7 @@ __all__ = [
     "Friction",
     "InverseDynamicsDerivatives",
     "ParameterGrouping",
+    "base_regressor",
     "bias",
     "coriolis_matrix",
     "dynamic_kernels",

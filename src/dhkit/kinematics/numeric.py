@@ -195,10 +195,7 @@ class NumericSearch:
         q, b, squares = self._candidates
         a = self._coordinates(goals)
         gaps = squares - 2 * a @ b.T
-
-        nearest = np.argpartition(gaps, self.restarts - 1, axis=1)[:, : self.restarts]
-        order = np.argsort(np.take_along_axis(gaps, nearest, axis=1), axis=1, kind="stable")
-        return q[np.take_along_axis(nearest, order, axis=1)]
+        return q[np.argsort(gaps, axis=1)[:, : self.restarts]]
 
     @cached_property
     def _candidates(self) -> tuple[Array, Array, Array]:

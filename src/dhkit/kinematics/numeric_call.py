@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.kernels import FastCall, SingleCall
@@ -141,34 +140,31 @@ class NumericCall:
         """Return the solution (n,) from further starts, the nearest to the first start of those found together."""
         if not np.isfinite(first).all():
             return None
-        newton = self._newton
-        inside = newton.inside(first)
         starts = self._search(seed).starts(T.reshape(1, 16))[0]
         for begin, end in doubling(RESTARTS):
-            q, is_closed = self._descended(T, starts[begin:end], tolerance)
-            closed = np.flatnonzero(is_closed)
-            if len(closed):
-                moved = (q[closed] - inside) / newton.units
-                nearest = closed[np.argmin((moved**2).sum(axis=1))]
-                solution: Array = q[nearest]
+            solutions = self._reached(T, starts[begin:end], tolerance)
+            if len(solutions) > 1:
+                newton = self._newton
+                moved = (solutions - newton.inside(first)) / newton.units
+                nearest = np.argmin((moved**2).sum(axis=1))
+                solutions = solutions[nearest : nearest + 1]
+            if len(solutions):
+                solution: Array = solutions[0]
                 return solution
         return None
 
-    def _descended(
-        self, T: Array, starts: Array, tolerance: float
-    ) -> tuple[Array, NDArray[np.bool_]]:
-        """Return where searches for one pose from starts (k, n) end, shape (k, n), and whether they close."""
-        ends = []
-        closed = []
+    def _reached(self, T: Array, starts: Array, tolerance: float) -> Array:
+        """Return the solutions (K, n) of one pose that searches from starts (k, n) end in."""
+        solutions = []
         for begin in range(0, len(starts), MAX_ITEMS):
-            some = starts[begin : begin + MAX_ITEMS].copy()
+            some = starts[begin : begin + MAX_ITEMS]
             count = len(some)
-            goals = np.broadcast_to(T, (count, 4, 4)).copy()
+            goals = np.empty((count, 4, 4))
+            goals[:] = T
             q, packed = self._call(goals, some, np.full((count, 1), tolerance), None)
             error = np.frombuffer(packed).reshape(count, _SIZE + 1)[:, :_SIZE]
-            ends.append(q[:, 0])
-            closed.append(closes(error, tolerance))
-        return np.concatenate(ends), np.concatenate(closed)
+            solutions.append(q[closes(error, tolerance), 0])
+        return np.concatenate(solutions)
 
     def _search(self, seed: int) -> NumericSearch:
         """Return the search whose starts are used, kept for its random joint positions."""

@@ -48,6 +48,7 @@ from .differentiable.recursive import (
 )
 from .differentiable.velocity_regressor import velocity_regressor as velocity_regressor
 from .exact.base_parameters import (
+    BaseColumn as BaseColumn,
     BaseParameters as BaseParameters,
     base_parameters as base_parameters,
 )

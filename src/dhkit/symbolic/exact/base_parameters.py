@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +41,15 @@ _READABLE = 30
 """Largest number of terms of a definition that a notebook shows; of a longer one it shows the number of terms."""
 _LONGEST_DEFINITION = 200
 """Largest number of characters of a definition that a notebook shows."""
+
+
+class BaseColumn(NamedTuple):
+    """What a base parameter is named after."""
+
+    kind: str
+    """Khalil's name without its number: ``"XX"``, ``"MX"``, ``"M"``, ``"Ia"`` or ``"Ic"``."""
+    joints: tuple[int, ...]
+    """The link or the joints that it belongs to, counted from 1."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,6 +92,12 @@ class BaseParameters:
     def names(self) -> tuple[str, ...]:
         """The base parameters' names, link by link."""
         return tuple(self.definitions)
+
+    @property
+    def columns(self) -> tuple[BaseColumn, ...]:
+        """What each base parameter is named after, in the order of ``names``."""
+        columns = _columns(self.full.arm)
+        return tuple(columns[name] for name in self.names)
 
     def __len__(self) -> int:
         return len(self.definitions)
@@ -245,15 +261,32 @@ def _regroup(arm: ExactArm) -> dict[str, Element]:
         bodies[j - 1] = bodies[j - 1] + shared.moved(_at_zero(arm, j, steps[j]))
 
     definitions: dict[str, Element] = {}
-    end = _ending(arm)
-    for j, body in enumerate(bodies, start=1):
-        definitions |= {f"{key}{j}{end}": body.second[place] for key, place in _SECOND.items()}
-        definitions |= {f"{key}{j}{end}": body.moment[axis] for key, axis in _MOMENT.items()}
-        definitions[f"M{j}{end}"] = body.mass
-        definitions[f"Ia{j}{end}"] = arm.armature[j - 1]
-    for i, j, inertia in arm.couplings:
-        definitions[f"Ic{i + 1}{j + 1}{end}"] = inertia
+    couplings = {(i + 1, j + 1): inertia for i, j, inertia in arm.couplings}
+    for name, (kind, joints) in _columns(arm).items():
+        body = bodies[joints[0] - 1]
+        if kind == "Ic":
+            definitions[name] = couplings[joints]
+        elif kind == "Ia":
+            definitions[name] = arm.armature[joints[0] - 1]
+        elif kind == "M":
+            definitions[name] = body.mass
+        elif kind in _MOMENT:
+            definitions[name] = body.moment[_MOMENT[kind]]
+        else:
+            definitions[name] = body.second[_SECOND[kind]]
     return {name: element for name, element in definitions.items() if element}
+
+
+def _columns(arm: ExactArm) -> dict[str, BaseColumn]:
+    """Return all parameters by name, link by link, of which some are base parameters."""
+    end = _ending(arm)
+    kinds = (*_SECOND, *_MOMENT, "M", "Ia")
+    columns = {
+        f"{kind}{j}{end}": BaseColumn(kind, (j,)) for j in range(1, arm.n + 1) for kind in kinds
+    }
+    for i, j, _ in arm.couplings:
+        columns[f"Ic{i + 1}{j + 1}{end}"] = BaseColumn("Ic", (i + 1, j + 1))
+    return columns
 
 
 def _ending(arm: ExactArm) -> str:
