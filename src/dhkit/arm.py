@@ -980,6 +980,7 @@ class Arm:
         tolerance: float = 1e-12,
         seed: int = 0,
         limits: bool = True,
+        prefer: Preference | None = None,
         threads: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> IKSolutions:
@@ -1003,6 +1004,9 @@ class Arm:
             Seed of the random starts.
         limits
             Whether joints stay inside their limits.
+        prefer
+            What the solution of a redundant arm is moved for along its self-motion: ``"limits"``, far from the limits;
+            ``"manipulability"``; or joint positions (n,), rad and m, or their name, to come near to.
         threads
             Number of threads that share a large batch.
         progress
@@ -1016,7 +1020,7 @@ class Arm:
         Raises
         ------
         ValueError, TypeError
-            An argument of another shape or type.
+            An argument of another shape or type; ``prefer`` for an arm that is not redundant.
 
         Examples
         --------
@@ -1024,8 +1028,12 @@ class Arm:
         >>> found = arm.ik_numeric(arm.fk("ready"))
         >>> str(found.status), found.q.shape
         ('ok', (1, 7))
+        >>> found = arm.ik_numeric(arm.fk("ready"), prefer="limits")
+        >>> bool(abs(arm.fk(found.q[0]) - arm.fk("ready")).max() < 1e-9)
+        True
         """
-        is_usual = position_only is False and limits is True and progress is None
+        is_usual = position_only is False and limits is True
+        is_usual = is_usual and prefer is None and progress is None
         is_usual = is_usual and type(restarts) is int and restarts == 511
         if is_usual and threads is _ONE_THREAD and type(tolerance) is float and type(seed) is int:
             found = self._calls.ik_numeric(T, q0, tolerance, seed)
@@ -1042,6 +1050,7 @@ class Arm:
             tolerance=tolerance,
             seed=seed,
             limits=limits,
+            prefer=prefer,
             threads=threads,
             progress=progress,
         )

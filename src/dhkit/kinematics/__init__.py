@@ -18,8 +18,9 @@ from dhkit.kinematics.manipulability import (
 )
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
+from dhkit.kinematics.preference import Preference
 from dhkit.kinematics.programs import export_kinematics, kinematic_kernels
-from dhkit.kinematics.redundant import Preference, redundancy_intervals, redundancy_of
+from dhkit.kinematics.redundant import redundancy_intervals, redundancy_of
 from dhkit.kinematics.singularities import (
     Singularities,
     determinant,

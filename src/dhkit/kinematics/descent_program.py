@@ -32,7 +32,7 @@ _DAMPING_DECREASE = 0.25
 """Factor of the damping after a step that reduces the error."""
 _DAMPING_INCREASE = 4.0
 """Factor of the damping after a step that is rejected because it increases the error."""
-_BASE_DAMPING = 1e-13
+BASE_DAMPING = 1e-13
 """Damping that is always added, for Jacobians without full rank."""
 
 
@@ -76,7 +76,7 @@ class _Search:
 
 
 @dataclass(frozen=True)
-class _Arm:
+class SymbolicArm:
     """An arm in symbols, with the units and limits of its steps."""
 
     table: SymbolicTable
@@ -89,7 +89,7 @@ class _Arm:
     upper: _SX
 
     @classmethod
-    def of(cls, description: Description, size: int) -> _Arm:
+    def of(cls, description: Description, size: int) -> SymbolicArm:
         """Return an arm whose numbers are parameters."""
         table, parameters = SymbolicTable.parametric(description)
         names = ("units", "turns", "lower", "upper")
@@ -109,14 +109,14 @@ class _Arm:
         A = ca.vertcat(J[:3, :] / self.length, J[3:, :])[: self.size, :] @ ca.diag(self.units)
         return error, A
 
-    def moved(self, search: _Search, damping: _SX) -> _SX:
-        """Return the joint values after one step of Levenberg, inside the limits."""
+    def step(self, q: _SX, error: _SX, A: _SX, damping: _SX) -> _SX:
+        """Return the joint values after one step of Levenberg, inside the limits; error and A are those at q."""
         endless = self.turns != 0
-        n = search.q.shape[0]
+        n = q.shape[0]
         limits = [(self.lower[i], self.upper[i], endless[i]) for i in range(n)]
-        descent = search.A.T @ search.error
-        stuck = [stays(search.q[i], descent[i], *limits[i]) for i in range(n)]
-        new = search.q + self.units * levenberg_step(search.A, search.error, damping, stuck)
+        descent = A.T @ error
+        stuck = [stays(q[i], descent[i], *limits[i]) for i in range(n)]
+        new = q + self.units * levenberg_step(A, error, damping, stuck)
         return ca.vertcat(*(moved_inside(new[i], *limits[i]) for i in range(n)))
 
     def inside(self, q: _SX) -> _SX:
@@ -163,7 +163,7 @@ def descent_program(description: Description, size: int) -> Loop:
     it is stalled. Then comes one more step, taken where it helps: it squares the error, down to rounding.
     """
     n = description.n
-    arm = _Arm.of(description, size)
+    arm = SymbolicArm.of(description, size)
     T = ca.SX.sym("T", 4, 4)
     start = ca.SX.sym("start", n)
     tolerance = ca.SX.sym("tolerance")
@@ -175,7 +175,7 @@ def descent_program(description: Description, size: int) -> Loop:
         "tolerance": tolerance,
     }
 
-    first_goal = _orthonormal_goal(T)
+    first_goal = orthonormal_goal(T)
     inside = arm.inside(start)
     error, A = arm.at(inside, first_goal)
     cost = ca.sumsqr(error)
@@ -194,7 +194,7 @@ def descent_program(description: Description, size: int) -> Loop:
     goes_on = ca.logic_and(ca.logic_not(is_closed), after.steps_since < _STALL_STEPS)
     step_graph = Graph.of("descent_step", within, {"state": after.vector, "goes_on": goes_on})
 
-    q = arm.moved(search, ca.SX(_BASE_DAMPING))
+    q = arm.step(search.q, search.error, search.A, ca.SX(BASE_DAMPING))
     error, _ = arm.at(q, goal)
     helps = ca.sumsqr(error) < search.cost
     finish_graph = Graph.of(
@@ -209,9 +209,9 @@ def descent_program(description: Description, size: int) -> Loop:
     return Loop(start_graph, step_graph, finish_graph, _MOST_STEPS)
 
 
-def _stepped(arm: _Arm, search: _Search, goal: _SX) -> _Search:
+def _stepped(arm: SymbolicArm, search: _Search, goal: _SX) -> _Search:
     """Return a search after a step; where it does not help, the damping is raised instead."""
-    q = arm.moved(search, search.damping * search.cost + _BASE_DAMPING)
+    q = arm.step(search.q, search.error, search.A, search.damping * search.cost + BASE_DAMPING)
     error, A = arm.at(q, goal)
     cost = ca.sumsqr(error)
 
@@ -236,7 +236,7 @@ def _stepped(arm: _Arm, search: _Search, goal: _SX) -> _Search:
     )
 
 
-def _orthonormal_goal(T: _SX) -> _SX:
+def orthonormal_goal(T: _SX) -> _SX:
     """Return (R, p) of a pose, 3 x 4, with an orthonormal rotation, from one that is orthonormal to 2e-6.
 
     Each iteration R (3 - R^T R) / 2 squares the defect (Björck and Bowie 1971).

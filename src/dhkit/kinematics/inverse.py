@@ -13,7 +13,8 @@ from dhkit.errors import ModelError
 from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.eliminated import solve_by_elimination
-from dhkit.kinematics.redundant import JOINTS, Preference, solve_redundant
+from dhkit.kinematics.preference import Preference
+from dhkit.kinematics.redundant import JOINTS, solve_redundant
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import free_angles, solve_in_closed_form, solver_of
 

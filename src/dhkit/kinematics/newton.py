@@ -14,6 +14,7 @@ from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.jacobian import jacobian
+from dhkit.kinematics.manipulability import freedoms
 from dhkit.symbolic import Graph, Loop, table_pattern
 
 
@@ -42,6 +43,11 @@ class Newton:
             lower=numbers.lower if limits else -anywhere,
             upper=numbers.upper if limits else anywhere,
         )
+
+    @property
+    def freedoms(self) -> int:
+        """Number of directions in which the arm can move the tool, of those that count."""
+        return freedoms(self.description, "whole" if self.size == 6 else "translational")
 
     @property
     def units(self) -> Array:

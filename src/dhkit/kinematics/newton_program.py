@@ -90,9 +90,9 @@ def levenberg_step(A: _SX, error: _SX, damping: _SX, stuck: Sequence[_SX]) -> _S
     size, n = A.shape
     A = A @ ca.diag(ca.vertcat(*(ca.if_else(stays_there, 0.0, 1.0) for stays_there in stuck)))
     if n < size:
-        dx = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
+        dx = solve_definite(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
     else:
-        dx = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
+        dx = A.T @ solve_definite(A @ A.T + damping * ca.SX.eye(size), error)
 
     # The whole step is shortened, which keeps its direction, until no joint moves by more than _MAX_STEP.
     return dx * ca.fmin(1.0, _MAX_STEP / (ca.norm_inf(dx) + _TINY))
@@ -113,7 +113,7 @@ def moved_inside(x: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     return ca.fmin(ca.fmax(x, lower), upper)
 
 
-def _solve(A: _SX, b: _SX) -> _SX:
+def solve_definite(A: _SX, b: _SX) -> _SX:
     """Return A^-1 b of a positive definite matrix, by its factors L D L^T."""
     D, LT, order = ca.ldl(A, False)
     return ca.ldl_solve(b, D, LT, order)

@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description, joint_array, takes_robot
+from dhkit.display import counted
 from dhkit.kernels import SMALL_BATCH, check_whole, in_threads, pose_rows, uncounted
 from dhkit.kinematics.candidates import are_poses, collect
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.newton import Newton, closes
+from dhkit.kinematics.preference import Preference, checked_preference
+from dhkit.kinematics.self_motion import improve_by_self_motion
 from dhkit.kinematics.solutions import IKSolutions
 
 Progress: TypeAlias = Callable[[int, int], None]
@@ -50,6 +53,7 @@ def solve_numerically(
     tolerance: float = 1e-12,
     seed: int = 0,
     limits: bool = True,
+    prefer: Preference | None = None,
     threads: int = 1,
     progress: Progress | None = None,
 ) -> IKSolutions:
@@ -82,6 +86,11 @@ def solve_numerically(
         Seed of the random starts.
     limits
         Whether joints stay inside their limits. Otherwise a flag tells where they are not.
+    prefer
+        What the solution of a redundant arm is moved for along its self-motion, with the tool at rest, to a local
+        maximum: ``"limits"``, the smallest distance from a limit as a share of half the joint's range;
+        ``"manipulability"``, that of :func:`dhkit.kinematics.manipulability` for whole motions, or for translations
+        with ``position_only``; or joint positions (n,), rad and m, or the name of a configuration, to come near to.
     threads
         Number of threads for a large batch.
     progress
@@ -98,10 +107,10 @@ def solve_numerically(
     Raises
     ------
     ValueError
-        T has not shape (..., 4, 4); ``q0`` does not fit; ``restarts`` is negative, ``tolerance`` not positive or
-        ``threads`` below 1.
+        T has not shape (..., 4, 4); ``q0`` or ``prefer`` does not fit; ``restarts`` is negative, ``tolerance`` not
+        positive or ``threads`` below 1; ``prefer`` is given for an arm that is not redundant.
     TypeError
-        T or ``q0`` is not numeric.
+        T, ``q0`` or ``prefer`` is not numeric.
 
     Examples
     --------
@@ -121,6 +130,12 @@ def solve_numerically(
     batch = poses.shape[:-2]
     n = description.n
     newton = Newton.of(description, position_only=position_only, limits=limits)
+    preferred = None if prefer is None else checked_preference(description, prefer)
+    if preferred is not None and n == newton.freedoms:
+        raise ValueError(
+            f"prefer is given, but {description.name} is not redundant: "
+            f"{counted(n, 'joint')} move the tool in {n} directions that count"
+        )
     starts = _first_starts(newton, q0, batch).reshape(-1, n)
     posed = are_poses(poses)
     q = np.full((posed.size, n), np.nan)
@@ -134,7 +149,14 @@ def solve_numerically(
 
     def solve(some: slice) -> int:
         with np.errstate(all="ignore"), few():
-            q[rows[some]], distance[rows[some]] = search(goals[some], starts[rows[some]])
+            found, distance[rows[some]] = search(goals[some], starts[rows[some]])
+            if preferred is not None:
+                closed = np.flatnonzero(~np.isnan(found).any(axis=1))
+                better = improve_by_self_motion(
+                    newton, goals[some][closed], found[closed], preferred, tolerance
+                )
+                found[closed] = better
+            q[rows[some]] = found
         return int(rows[some][-1]) + 1
 
     poses_per_thread = -(-len(rows) // threads)

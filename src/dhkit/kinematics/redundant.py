@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +17,6 @@ from dhkit.description import (
     Array,
     Description,
     joint_array,
-    joint_vector,
     lock,
     takes_robot,
     world_to_frames,
@@ -37,6 +35,7 @@ from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
 from dhkit.kinematics.eliminated import elimination_kernels, solve_by_elimination
 from dhkit.kinematics.manipulability import manipulability
 from dhkit.kinematics.numeric import solve_numerically
+from dhkit.kinematics.preference import Preference, checked_preference
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import Solver, solve_in_closed_form, solver_for
 
@@ -57,8 +56,6 @@ _ACCURACY = 1e-9
 """Steps in which intervals of the redundancy are looked for, and accuracy of their ends, rad."""
 _PARTS = 16
 """Parts into which the place of an end is divided again and again: a call takes about as long as 100 values in it."""
-Preference: TypeAlias = 'Literal["limits", "manipulability"] | ArrayLike'
-"""How a redundancy is chosen."""
 
 
 def solve_redundant(
@@ -331,17 +328,12 @@ class _Score:
 
 def _score_of(description: Description, prefer: Preference) -> _Score:
     """Return the score that a preference stands for."""
+    aim, posture = checked_preference(description, prefer)
     numbers = description.numbers
-    if isinstance(prefer, str):
-        if prefer == "limits":
-            return _Score(partial(_share_of_limits, numbers.lower, numbers.upper))
-        if prefer == "manipulability":
-            return _Score(lambda q: manipulability(description, q, "whole"))
-        if prefer not in description.configurations:
-            raise ValueError(
-                f"prefer is {prefer!r}; expected 'limits', 'manipulability', joint positions or a configuration"
-            )
-    posture = joint_vector(description, prefer, "prefer")
+    if aim == "limits":
+        return _Score(partial(_share_of_limits, numbers.lower, numbers.upper))
+    if aim == "manipulability":
+        return _Score(lambda q: manipulability(description, q, "whole"))
     return _Score(lambda q: -np.sum((q - posture) ** 2, axis=-1), posture)
 
 

@@ -261,7 +261,9 @@ def _regroup(arm: ExactArm) -> dict[str, Element]:
         bodies[j - 1] = bodies[j - 1] + shared.moved(_at_zero(arm, j, steps[j]))
 
     definitions: dict[str, Element] = {}
-    couplings = {(i + 1, j + 1): inertia for i, j, inertia in arm.couplings}
+    couplings: dict[tuple[int, ...], Element] = {
+        (i + 1, j + 1): inertia for i, j, inertia in arm.couplings
+    }
     for name, (kind, joints) in _columns(arm).items():
         body = bodies[joints[0] - 1]
         if kind == "Ic":
