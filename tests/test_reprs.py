@@ -496,6 +496,7 @@ VALUES = {
     programs.Part: lambda: check().functions["ik"][1],
     programs.Program: lambda: programs.Program(written("mine.py", "def fk(q):\n    return q\n")),
     # symbolic
+    symbolic.BaseColumn: lambda: planar().base_parameters().columns[0],
     symbolic.BaseParameters: lambda: planar().base_parameters(),
     symbolic.CasadiFunctions: lambda: planar().casadi,
     symbolic.Element: lambda: planar().lagrangian.K,
