@@ -1033,6 +1033,7 @@ TOKENS = {
 KNOWN_TOKENS = [
     (".m", " = m1*l1;\n"),
     (".m", "q(1) += ,"),
+    (".m", "M(2,) = 4\nV(,q1) = m1\n[M, g] = deal(1,,2)"),
     (".m", "++ M * function \n q(1) += ; ="),
     (".tex", r"\begin{align} V &= $$\end{align}"),
 ]

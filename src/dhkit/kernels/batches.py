@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from dhkit.description import Array
 from dhkit.description.arrays import number_array
 from dhkit.kernels.kernel import Kernel
+from dhkit.kernels.large_arrays import large_array
 
 
 def fill(
@@ -176,7 +177,7 @@ def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
     (2, 3)
     """
     if out is None:
-        return np.empty(shape)
+        return large_array(shape)
     if not isinstance(out, np.ndarray):
         raise ValueError(
             f"out is {type(out).__name__}; expected an array of shape {shape}, float64"

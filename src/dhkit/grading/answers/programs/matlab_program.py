@@ -422,7 +422,10 @@ class MatlabProgram:
                 self._refuse_script(statement, word)
                 self._break(statement, scope, what, where)
             else:
-                self._read_statement(statement, word, scope, where)
+                try:
+                    self._read_statement(statement, word, scope, where)
+                except UnreadError as error:
+                    self._break(statement, scope, f"a statement in which {error}", where)
 
     def _break(self, statement: MatlabStatement, scope: Scope, what: str, where: str) -> None:
         """Note that a statement changes names in a way that is not read."""
