@@ -16,6 +16,7 @@ from dhkit.dynamics.regressor import (
 )
 from dhkit.errors import DhkitError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
+from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import (
     jacobian_derivative_kernel,
@@ -24,8 +25,6 @@ from dhkit.kinematics.jacobian import (
 )
 from dhkit.kinematics.numeric_call import NumericCall, numeric_call
 from dhkit.kinematics.pose_call import (
-    EliminationCall,
-    PoseCall,
     RedundantCall,
     pose_call,
     redundant_call,
@@ -132,7 +131,7 @@ class ArmCalls:
         """Return the function of a quantity that is asked for the first time."""
         call: FastCall | None
         if name == "ik":
-            call = pose_call(self._description, partial(setattr, self, name))
+            call = self._pose_call()
         elif name == "ik_at_redundancy":
             call = redundant_call(self._description)
         elif name == "ik_numeric":
@@ -145,6 +144,18 @@ class ArmCalls:
         function: FastCall = self.__dict__[name]
         return function
 
+    def _pose_call(self) -> FastCall | None:
+        """Return the function of inverse kinematics; None of arms that only the ordinary way solves."""
+        description = self._description
+        found = classify(description)
+        if found.family is not None:
+            return pose_call(description)
+        if found.neighbour is not None or description.kinds != "RRRRRR":
+            return None
+        from dhkit.kinematics.eliminated_call import elimination_call  # with SciPy's rotations
+
+        return elimination_call(description, partial(setattr, self, "ik"))
+
     def compile(self) -> Iterator[str]:
         """Compile every quantity now, but for those that are slow to derive, and yield its name."""
         for name in _QUANTITIES:
@@ -154,7 +165,7 @@ class ArmCalls:
             if call is not None:
                 call.compile()
             yield name
-        if isinstance(self.ik, PoseCall | EliminationCall):
+        if hasattr(self.ik, "compile"):
             self.ik.compile()
         if isinstance(self.ik_at_redundancy, RedundantCall):
             self.ik_at_redundancy.compile()

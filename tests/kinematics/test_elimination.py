@@ -14,7 +14,10 @@ from dhkit import Arm
 from dhkit.description import from_dh, pose, with_base, with_tool
 from dhkit.errors import ModelError
 from dhkit.kinematics import classify, inverse_kinematics, solve_numerically
-from dhkit.kinematics.eliminated import SAME_ANGLE, solve_by_elimination
+from dhkit.kinematics.eliminated import solve_by_elimination
+from dhkit.kinematics.eliminated_call import EliminatedPoseCall
+from dhkit.kinematics.polynomial.six_joints import six_joints
+from dhkit.kinematics.polynomial.solve import SAME_ANGLE
 from ssik_peer import solutions_of
 
 CLOSES = 1e-12  # share of the reach and rad, away from singularities
@@ -323,3 +326,45 @@ def test_nearly_folded_wrists_are_complete_or_said_not_to_be():
         found = arm.ik(arm.fk(state))
         apart = 2 * np.abs(np.sin((found.q - state) / 2)).max(axis=-1)
         assert not found.complete or np.nanmin(apart) < 1e-4
+
+
+@pytest.mark.parametrize("name", SIX)
+def test_single_calls_find_what_batches_find(name, law):
+    """A single pose is solved by a compiled function, or the ordinary way where two solutions nearly coincide."""
+    arm = SIX[name]
+    q = np.random.default_rng(11).uniform(-np.pi, np.pi, (law.samples(20_000, quick=150), 6))
+    # Beside random states some near singularities, and poses that are not reached or none.
+    q[::10, 4] = 1e-5
+    T = arm.fk(q)
+    T[3, :3, 3] *= 10.0
+    T[5, 0, 0] = np.nan
+    batch = solve_by_elimination(arm.description, T)
+    call = EliminatedPoseCall(arm.description, six_joints(arm.description).two_parallel)
+    call.compile()
+    taken = 0
+    for k, pose_of_tool in enumerate(T):
+        alone = call(pose_of_tool, None)
+        if alone is None:
+            continue
+        taken += 1
+        count = int(batch.valid[k].sum())
+        assert alone.q.shape == (count, 6)
+        assert np.abs(alone.q - batch.q[k, :count]).max() < 1e-9
+        assert alone.valid.all() and alone.complete
+        assert alone.status == batch.status[k] == "ok"
+        assert (alone.flags == batch.flags[k, :count]).all()
+        assert alone.distance == 0.0
+        assert alone.branches == batch.branches[:count]
+    assert taken > 0.6 * len(T)
+
+
+def test_single_calls_leave_other_arguments_to_the_ordinary_way():
+    arm = SIX["FANUC CRX-10iA"]
+    call = EliminatedPoseCall(arm.description, six_joints(arm.description).two_parallel)
+    call.compile()
+    T = arm.fk(np.array([0.3, 1.0, -0.5, 0.7, 0.2, 0.4]))
+    assert call(T, None) is not None
+    others = [T.tolist(), T[None], np.asfortranarray(T), T.astype(np.float32), np.eye(3), None]
+    for other in [*others, np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])]:
+        assert call(other, None) is None
+    assert call(T, np.empty((8, 6))) is None

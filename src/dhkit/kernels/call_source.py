@@ -12,7 +12,7 @@ from math import prod
 
 from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER
 from dhkit.kernels.scalar_source import run_source
-from dhkit.symbolic import Graph, Loop
+from dhkit.symbolic import Program
 
 MAX_ITEMS = 64
 """Largest number of items of a call; for larger batches, the vector kernel is faster."""
@@ -124,14 +124,14 @@ class _Function:
             self.require(f"%{name}_has_size{k}")
 
 
-def state_shapes(program: Graph | Loop) -> list[tuple[int, ...]]:
+def state_shapes(program: Program) -> list[tuple[int, ...]]:
     """Return the shapes of a program's inputs after the parameters; CasADi's columns are vectors."""
     shapes = [variable.shape for variable in program.inputs[1:]]
     return [shape[:1] if shape[1:] == (1,) else shape for shape in shapes]
 
 
 def call_source(
-    program: Graph | Loop, types: Sequence[str], tail: Sequence[int], *, refuses_nan: bool
+    program: Program, types: Sequence[str], tail: Sequence[int], *, refuses_nan: bool
 ) -> str:
     """Return a module with ``PyObject *call(PyObject *context, PyObject *const *arguments, Py_ssize_t count)``.
 
@@ -162,7 +162,7 @@ _BYTES = {FLOAT: 8, SMALL_INTEGER: 1}
 """Sizes of an entry in bytes, by type."""
 
 
-def _call(program: Graph | Loop, types: Sequence[str], tail: Sequence[int]) -> list[str]:
+def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[str]:
     """Return the lines of ``call``."""
     shapes = state_shapes(program)
     is_packing = len(types) > 1

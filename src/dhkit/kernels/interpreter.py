@@ -15,7 +15,8 @@ from dhkit.description import Array
 from dhkit.kernels.elementary import EXACT_RANGE, atan2
 from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER
 from dhkit.kernels.stages import Stage, Stages
-from dhkit.symbolic import Graph, Loop
+from dhkit.symbolic import Graph, Loop, Pipeline
+from dhkit.symbolic.programs.pipeline import INDEX
 
 if TYPE_CHECKING:
     import casadi
@@ -111,6 +112,50 @@ class LoopInterpreter:
             if not len(active):
                 break
         self._finish(parameters, [*inputs, fixed, state], outputs)
+
+
+class PipelineInterpreter:
+    """A pipeline as a function of batches, item after item."""
+
+    def __init__(self, pipeline: Pipeline) -> None:
+        self._pipeline = pipeline
+        self._steps = [
+            Interpreter(step.graph, [FLOAT] * len(step.graph.outputs)) for step in pipeline.steps
+        ]
+
+    def __call__(
+        self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]
+    ) -> None:
+        """Fill ``outputs``; all are arrays (N, size), as for :class:`dhkit.kernels.Kernel`."""
+        for row in range(len(inputs[0])):
+            is_finite = all(np.isfinite(x[row]).all() for x in inputs)
+            found = self._item(parameters, [x[row] for x in inputs])
+            for name, output in zip(self._pipeline.results, outputs, strict=True):
+                output[row] = found[name].ravel() if is_finite else nan
+
+    def _item(self, parameters: Array, inputs: Sequence[Array]) -> dict[str, Array]:
+        """Return inputs and outputs of all steps, shape (items, entries), by their names, for one item."""
+        pipeline = self._pipeline
+        names = [variable.name for variable in pipeline.inputs[1:]]
+        known = {name: x[None] for name, x in zip(names, inputs, strict=True)}
+        for step, run in zip(pipeline.steps, self._steps, strict=True):
+            for _ in range(step.most):
+                rows = []
+                for variable in step.graph.inputs[1:]:
+                    source, is_shared = pipeline.source(step, variable.name)
+                    if source == INDEX:
+                        x = np.arange(float(step.items))[:, None]
+                    elif is_shared:
+                        x = np.tile(known[source].T.ravel(), (step.items, 1))
+                    else:
+                        x = known[source]
+                    rows.append(np.ascontiguousarray(x))
+                results = [np.empty((step.items, one.size)) for one in step.graph.outputs]
+                run(parameters, rows, results)
+                known.update((one.name, x) for one, x in zip(step.outputs, results, strict=False))
+                if step.most == 1 or not results[-1].any():
+                    break
+        return known
 
 
 def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:

@@ -17,10 +17,10 @@ from dhkit.description import Array
 from dhkit.display import repr_line
 from dhkit.errors import DhkitError
 from dhkit.kernels.threads import all_in_threads
-from dhkit.symbolic import Graph, Loop
+from dhkit.symbolic import Loop, Pipeline, Program
 
 if TYPE_CHECKING:
-    from dhkit.kernels.interpreter import Interpreter, LoopInterpreter
+    from dhkit.kernels.interpreter import Interpreter, LoopInterpreter, PipelineInterpreter
     from dhkit.kernels.machine_code import CompiledCall, CompiledFunction
 
 log = logging.getLogger(__name__)
@@ -76,7 +76,7 @@ class Kernel:
         self,
         name: str,
         pattern: str,
-        derive: Callable[[], Graph | Loop],
+        derive: Callable[[], Program],
         types: Sequence[str],
         is_loop: bool = False,
     ) -> None:
@@ -84,8 +84,8 @@ class Kernel:
         self._pattern = pattern
         self._derive = derive
         self.types = tuple(types)
-        self._graph: Graph | Loop | None = None
-        self._interpreter: Interpreter | LoopInterpreter | None = None
+        self._graph: Program | None = None
+        self._interpreter: Interpreter | LoopInterpreter | PipelineInterpreter | None = None
         self._function: CompiledFunction | None = None
         self._is_loop = is_loop
         self._call: CompiledCall | None = None
@@ -216,12 +216,12 @@ class Kernel:
             return
         store.write(self.name, store.digest(self.name, self._pattern), code)
 
-    def _source(self, program: Graph | Loop) -> str:
+    def _source(self, program: Program) -> str:
         """Return the text of the kernel that is compiled."""
-        if isinstance(program, Loop) and not program.in_lanes:
-            from dhkit.kernels.scalar_source import loop_source
+        if isinstance(program, Pipeline) or (isinstance(program, Loop) and not program.in_lanes):
+            from dhkit.kernels.scalar_source import item_source
 
-            return loop_source(program, self.types)
+            return item_source(program, self.types)
         from dhkit.kernels.llvm_source import llvm_source
 
         return llvm_source(program, self.types)
@@ -231,13 +231,19 @@ class Kernel:
         self._failed = True
         log.warning("%s is interpreted: it cannot be compiled here (%s)", self.name, error)
 
-    def _interpreted(self) -> Interpreter | LoopInterpreter:
+    def _interpreted(self) -> Interpreter | LoopInterpreter | PipelineInterpreter:
         program = self.program()
         with _deriving:
             if self._interpreter is None:
-                from dhkit.kernels.interpreter import Interpreter, LoopInterpreter
+                from dhkit.kernels.interpreter import (
+                    Interpreter,
+                    LoopInterpreter,
+                    PipelineInterpreter,
+                )
 
-                if isinstance(program, Loop):
+                if isinstance(program, Pipeline):
+                    self._interpreter = PipelineInterpreter(program)
+                elif isinstance(program, Loop):
                     self._interpreter = LoopInterpreter(program)
                 else:
                     self._interpreter = Interpreter(program, self.types)
@@ -248,7 +254,7 @@ class Kernel:
         """Whether kernels are compiled: see :func:`kernel_mode`."""
         return kernel_mode()
 
-    def program(self) -> Graph | Loop:
+    def program(self) -> Program:
         """Return the program, derived at the first call."""
         with _deriving:
             if self._graph is None:
@@ -310,7 +316,7 @@ def uncounted() -> Iterator[None]:
 def kernel(
     name: str,
     pattern: str,
-    derive: Callable[[], Graph | Loop],
+    derive: Callable[[], Program],
     types: Sequence[str] = ("float64",),
     is_loop: bool = False,
 ) -> Kernel:

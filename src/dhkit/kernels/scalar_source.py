@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from itertools import chain
 
 from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER, STORED, loop_values, result_values
+from dhkit.kernels.pipeline_source import pipeline_source
 from dhkit.kernels.vectors import EXACT, FUSING, Body, Vector
-from dhkit.symbolic import Graph, Loop
+from dhkit.symbolic import Loop, Pipeline, Program
 
 
-def run_source(
-    program: Graph | Loop, types: Sequence[str], *, refuses_nan: bool = False
-) -> list[str]:
+def run_source(program: Program, types: Sequence[str], *, refuses_nan: bool = False) -> list[str]:
     """Return the lines of ``i1 run(ptr parameters, ptr x0, ..., ptr y0, ...)``, which computes one item.
 
     It reads an item's inputs before it writes its outputs, so that they may share memory. Float outputs are NaN where
@@ -28,8 +27,10 @@ def run_source(
     types
         Types of its outputs, see :func:`dhkit.kernels.llvm_source.llvm_source`.
     refuses_nan
-        Whether it writes nothing and returns false where an entry of the first output is not finite.
+        Whether it writes nothing and returns false where an entry of the first output is not finite; not of a pipeline.
     """
+    if isinstance(program, Pipeline):
+        return pipeline_source(program)
     # As in the vector kernel: programs that decide small integers round every operation.
     body = Body(EXACT if SMALL_INTEGER in types else FUSING, width=1)
     inputs = [
@@ -68,12 +69,12 @@ def run_source(
     ]
 
 
-def loop_source(loop: Loop, types: Sequence[str]) -> str:
+def item_source(program: Loop | Pipeline, types: Sequence[str]) -> str:
     """Return a module with the function ``kernel`` of :func:`dhkit.kernels.llvm_source.llvm_source`, item by item."""
-    sizes = [variable.size for variable in (*loop.inputs[1:], *loop.outputs)]
-    kinds = ["double"] * (len(loop.inputs) - 1) + [STORED[kind] for kind in types]
+    sizes = [variable.size for variable in (*program.inputs[1:], *program.outputs)]
+    kinds = ["double"] * (len(program.inputs) - 1) + [STORED[kind] for kind in types]
     lines = [
-        *run_source(loop, types),
+        *run_source(program, types),
         "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
         "entry:",
         "  %none = icmp sle i64 %count, 0",
@@ -104,7 +105,7 @@ def loop_source(loop: Loop, types: Sequence[str]) -> str:
     )
 
 
-def _input_names(program: Graph | Loop) -> list[str]:
+def _input_names(program: Program) -> list[str]:
     return ["parameters", *(f"x{k}" for k in range(len(program.inputs) - 1))]
 
 

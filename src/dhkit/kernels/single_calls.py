@@ -34,7 +34,7 @@ from dhkit.kernels.call_source import (
     state_shapes,
 )
 from dhkit.kernels.kernel import Kernel, compiling
-from dhkit.symbolic import Graph, Loop
+from dhkit.symbolic import Program
 
 if TYPE_CHECKING:
     from dhkit.kernels.machine_code import CompiledCall
@@ -182,7 +182,7 @@ def _are_near(found: Sequence[NDArray[Any]], expected: Sequence[NDArray[Any]]) -
     return True
 
 
-def unpacked(packed: bytes, program: Graph | Loop, types: Sequence[str]) -> list[NDArray[Any]]:
+def unpacked(packed: bytes, program: Program, types: Sequence[str]) -> list[NDArray[Any]]:
     """Return the outputs of a program after the first one from what a function packed.
 
     Parameters

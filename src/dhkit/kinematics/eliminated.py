@@ -24,12 +24,9 @@ from dhkit.kinematics.jacobian import jacobian, jacobian_kernel
 from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.trigonometric import roots_kernel
+from dhkit.kinematics.polynomial.solve import SAME_ANGLE
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
-
-SAME_ANGLE = 1e-6
-"""Angles that differ by less, rad, count as equal when solutions are sorted."""
 
 
 def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
@@ -89,12 +86,17 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
         np.full(posed.shape, np.nan),
         positions=poses[..., :3, 3],
         posed=posed,
-        branches=tuple(f"solution {k + 1}" for k in range(B)),
+        branches=branch_names(B),
         met=ALL_COORDINATES,
         flags=flags.reshape(*poses.shape[:-2], B),
         complete=bool(is_known.all()) and not has_curves(description),
         none_exist=none_exist.reshape(posed.shape),
     )
+
+
+def branch_names(count: int) -> tuple[str, ...]:
+    """Return the names of so many solutions."""
+    return tuple(f"solution {k + 1}" for k in range(count))
 
 
 def elimination_kernels(description: Description) -> list[Kernel]:
@@ -108,7 +110,7 @@ def elimination_kernels(description: Description) -> list[Kernel]:
     newton = Newton.of(description, position_only=False, limits=False)
     descent, _ = descent_kernel(description, newton.size)
     of_jacobian, _ = jacobian_kernel(description, "world")
-    return [*six_joints(description).elimination.kernels, roots_kernel(), descent, of_jacobian]
+    return [*six_joints(description).elimination.kernels, descent, of_jacobian]
 
 
 def _singular_flags(

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from dhkit.description import Array, Description, world_to_tool
-from dhkit.kernels import FastCall, SingleCall, never
-from dhkit.kernels.background import Background
+from dhkit.kernels import FastCall, SingleCall
 from dhkit.kernels.call_source import MAX_ITEMS
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.eliminated import elimination_kernels
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_for, solver_of
-
-log = logging.getLogger(__name__)
 
 _NO_SEED = np.zeros(2)
 """Angles of free joints without a seed, rad."""
@@ -131,59 +126,23 @@ class RedundantCall:
         return IKSolutions.of_packed(q, packed, shared, False, np.array(redundancy))
 
 
-class EliminationCall:
-    """Takes no pose, but counts calls: the kernels of an elimination are compiled after many, in a thread.
-
-    Otherwise they would stay interpreted, because small batches do not count towards compiling.
-    """
-
-    def __init__(self, description: Description, install: Callable[[FastCall], None]) -> None:
-        self._description = description
-        self._install = install
-        self._background = Background("elimination", self._compile_in_thread)
-
-    def __call__(self, *_: object) -> None:
-        """Count a call."""
-        self._background.count()
-
-    def compile(self) -> None:
-        """Compile the kernels now."""
-        for one in elimination_kernels(self._description):
-            one.compile()
-        self._install(never)
-
-    def _compile_in_thread(self) -> None:
-        try:
-            self.compile()
-        except Exception as error:
-            log.warning("single calls of inverse kinematics stay interpreted (%s)", error)
-            self._install(never)
-
-
 def _may_share_memory(T: Any, out: Any) -> bool:
     are_arrays = isinstance(T, np.ndarray) and isinstance(out, np.ndarray)
     return not are_arrays or np.may_share_memory(T, out)
 
 
-def pose_call(
-    description: Description, install: Callable[[FastCall], None]
-) -> PoseCall | EliminationCall | None:
-    """Return the function of an arm; None without a closed form that is its own, unless it is solved by elimination.
+def pose_call(description: Description) -> PoseCall | None:
+    """Return the function of an arm; None without a closed form that is its own.
 
     Parameters
     ----------
     description
         The robot.
-    install
-        Called with the function that takes the place of this one.
     """
     solver = solver_of(description)
-    if classify(description).neighbour is not None:
+    if solver is None or classify(description).neighbour is not None:
         return None
-    if solver is not None:
-        return PoseCall(description, solver)
-    is_eliminated = description.kinds == "RRRRRR"
-    return EliminationCall(description, install) if is_eliminated else None
+    return PoseCall(description, solver)
 
 
 def redundant_call(description: Description) -> RedundantCall | None:

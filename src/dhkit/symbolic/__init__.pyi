@@ -75,6 +75,11 @@ from .programs.graph import (
     operation_count as operation_count,
 )
 from .programs.loop import Loop as Loop
+from .programs.pipeline import (
+    Pipeline as Pipeline,
+    PipelineStep as PipelineStep,
+    Program as Program,
+)
 from .programs.printers import c_source as c_source, export_c as export_c
 from .ring.elements import Element as Element, Elements as Elements, RingError as RingError
 from .textbook import TextbookDerivation as TextbookDerivation, derive as derive

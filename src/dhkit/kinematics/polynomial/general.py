@@ -29,6 +29,8 @@ from dhkit.kernels import Kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import tool_kernel
 from dhkit.kinematics.newton import Newton, error_kernel, magnitude
+from dhkit.kinematics.polynomial.solve import Candidates
+from dhkit.kinematics.polynomial.trigonometric import angles, real_roots, roots_kernel
 
 Complex: TypeAlias = "NDArray[np.complex128]"
 Coefficients: TypeAlias = "tuple[Array, Array, Array]"
@@ -51,6 +53,8 @@ _MIXED = 0.7 + 0.3j
 """Factor t of t x + y, by which two solutions differ even if they share x or y."""
 _OF_TWO_POWERS: Complex = np.kron(_AS_POWERS, _AS_POWERS)
 _EACH = slice(None)
+_FIRST_ANGLE = 0.1
+"""First angle at which polynomials are evaluated, rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,54 +107,42 @@ class General:
 
     @property
     def kernels(self) -> Sequence[Kernel]:
-        """The kernels of the errors; all else is linear algebra by LAPACK."""
+        """The kernels of the roots and of the errors; all else is linear algebra by LAPACK."""
         tool, _ = tool_kernel(self.newton.description)
-        return [tool, error_kernel(self.newton.size)]
+        return [roots_kernel(), tool, error_kernel(self.newton.size)]
 
-    def first_angle(self, poses: Array) -> Array:
-        """Return the first angle at which the polynomial is evaluated, shape (N,)."""
-        return np.full(len(poses), 0.1)
-
-    def values(self, poses: Array, angles: Array) -> Array:
-        """Return the polynomial's values.
-
-        Parameters
-        ----------
-        poses
-            Poses of the tool in the world, shape (N, 16), m.
-        angles
-            Angles of the joint, shape (N, S), rad.
-        """
-        six = self._reduced(self._motions(poses)).six
-        values = [np.linalg.det(_matrix(six, angle)) for angle in angles.T]
-        # The determinant is real up to a constant factor of absolute value 1.
-        return np.asarray((np.stack(values, axis=1) * self._phase).real)
-
-    def starts(
-        self, poses: Array, owner: NDArray[np.intp], angles: Array
-    ) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return joint values near the solutions at roots of the polynomial.
-
-        Parameters
-        ----------
-        poses
-            Shape (N, 16), m.
-        owner, angles
-            Index of each root's pose, and the roots, shape (K,) each, rad.
-
-        Returns
-        -------
-        tuple[NDArray[np.intp], Array, Array]
-            Indices of the roots, shape (L,), ascending; joint values, shape (L, 6), rad, in (-pi, pi]; and their
-            errors, shares of the reach and rad, shape (L,).
-        """
+    def candidates(self, poses: Array) -> Candidates:
+        """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
         motions = self._motions(poses)
         side = self._reduced(motions)
-        of_root, null = _null_vectors(_matrix(side.six, angles, owner))
+        values = [
+            np.linalg.det(_matrix(side.six, np.full(len(poses), _FIRST_ANGLE + angle)))
+            for angle in angles()
+        ]
+        # The determinant is real up to a constant factor of absolute value 1.
+        roots = real_roots((np.array(values).T * self._phase).real)
+        of_root, q = self._joints_at_roots(motions, side, roots.owner, roots.angle + _FIRST_ANGLE)
+        owner = roots.owner[of_root]
+        error = magnitude(self.newton.error(q, poses[owner]))
+        return Candidates(q, error, owner, of_root, roots.expected, roots.is_delicate, roots.error)
+
+    def _joints_at_roots(
+        self, motions: Array, side: _FarSide, owner: NDArray[np.intp], roots: Array
+    ) -> tuple[NDArray[np.intp], Array]:
+        """Return indices of roots, shape (L,), ascending, and joint values, shape (L, 6), rad, in (-pi, pi].
+
+        Parameters
+        ----------
+        motions, side
+            Of the poses.
+        owner, roots
+            Index of each root's pose, and the roots, shape (K,) each, rad.
+        """
+        of_root, null = _null_vectors(_matrix(side.six, roots, owner))
         order = np.argsort(of_root, kind="stable")
         of_root = of_root[order]
         null = null[order]
-        kept = angles[of_root]
+        kept = roots[of_root]
         owner = owner[of_root]
         second = np.angle((null[:, 1:] * null[:, :-1].conj()).sum(axis=(1, 2)))
         third = np.angle((null[:, :, 1:] * null[:, :, :-1].conj()).sum(axis=(1, 2)))
@@ -168,7 +160,7 @@ class General:
         b = np.arctan2(products[:, 1, 0], products[:, 0, 0])
         q = self._joints(motions[owner], (kept, second, third), (a, b))
         q -= math.tau * np.ceil((q - math.pi) / math.tau)
-        return of_root, q, magnitude(self.newton.error(q, poses[owner]))
+        return of_root, q
 
     def _joints(
         self, motions: Array, near: tuple[Array, Array, Array], far: tuple[Array, Array]

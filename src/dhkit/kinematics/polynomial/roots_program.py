@@ -19,24 +19,24 @@ SX: TypeAlias = Any
 BEYOND = 4.0
 """Stands for the angle of a root that is not nearly real, rad: no angle is beyond pi."""
 _IMAGINARY_UNIT = Root(-1.0)
-_MOST_STEPS = 60
+MOST_STEPS = 60
 """Largest number of Aberth's steps; most polynomials take 7 to 12."""
-_CONVERGED = 1e-7
+CONVERGED = 1e-6
 """Estimates whose last steps are below this share of their absolute value are roots: steps shrink by their cubes."""
-_FIRST_RADII = (0.95, 1.05)
-_FIRST_ANGLE = 0.4
+FIRST_RADII = (0.95, 1.05)
+FIRST_ANGLE = 0.4
 """The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps would keep both."""
 _ROUNDING = 4e-15
 """A value below this share of the sum of the terms' absolute values is rounding: its estimate is a root."""
 _NEARLY_REAL = 3e-2
 """Largest imaginary part, rad, of a root that is tried: rounding of 1e-15 in the coefficients moves a root of
 multiplicity k by its k-th root, 0.013 for k = 8. Whether a solution is there is decided by what follows."""
-_ERROR_OF_VALUE = 1e-11
+ERROR_OF_VALUE = 1e-11
 """Assumed error of a polynomial near a root, relative to its largest coefficient. The error itself is some 1e-14; the
 four roots of a pose at two singularities, which it moves by 1e-3, are held to be real with this margin only."""
 _MARGIN = 1e4
 """Factor of that error, for roots that are tried."""
-_NEAR_ROOTS = 1e-3
+NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
 
 
@@ -55,7 +55,7 @@ def roots_program(degree: int, samples: int) -> Loop:
     parameters = ca.SX.sym("none")
     values = ca.SX.sym("values", samples)
     inputs: dict[str, SX] = {"parameters": parameters, "values": values}
-    numbers, error = _coefficients(values, degree)
+    numbers, error = coefficients(values, degree)
     first = _Roots.first(degree)
     outputs: dict[str, SX] = {"state": first.vector, "fixed": ca.vertcat(numbers, error)}
     begin = Graph.of("roots_begin", inputs, outputs)
@@ -63,14 +63,14 @@ def roots_program(degree: int, samples: int) -> Loop:
     fixed = ca.SX.sym("fixed", 2 * degree + 2)
     state = ca.SX.sym("state", 4 * degree)
     within = {**inputs, "fixed": fixed, "state": state}
-    polynomial = _polynomial(fixed[:-1], degree)
+    polynomial = polynomial_of(fixed[:-1], degree)
     roots = _Roots.read(state)
     after, step = _stepped(polynomial, roots)
-    goes_on = ca.if_else(step >= _CONVERGED, 1.0, 0.0)
+    goes_on = ca.if_else(step >= CONVERGED, 1.0, 0.0)
     step_graph = Graph.of("roots_step", within, {"state": after.vector, "goes_on": goes_on})
 
     finish = Graph.of("roots", within, _real_roots(polynomial, roots, fixed[-1]))
-    return Loop(begin, step_graph, finish, _MOST_STEPS, in_lanes=True)
+    return Loop(begin, step_graph, finish, MOST_STEPS, in_lanes=True)
 
 
 @dataclass(frozen=True)
@@ -84,17 +84,16 @@ class _Roots:
         """Return the first estimates."""
         count = 2 * degree
         numbers = [
-            cmath.rect(_FIRST_RADII[k % 2], _FIRST_ANGLE + math.tau / count * k)
-            for k in range(count)
+            cmath.rect(FIRST_RADII[k % 2], FIRST_ANGLE + math.tau / count * k) for k in range(count)
         ]
-        return cls([_complex(ca.SX(z.real), ca.SX(z.imag)) for z in numbers])
+        return cls([complex_of(ca.SX(z.real), ca.SX(z.imag)) for z in numbers])
 
     @classmethod
     def read(cls, state: SX) -> _Roots:
         """Return the estimates of a state: their real parts, then their imaginary parts."""
         entries = ca.vertsplit(state)
         count = len(entries) // 2
-        return cls([_complex(entries[k], entries[count + k]) for k in range(count)])
+        return cls([complex_of(entries[k], entries[count + k]) for k in range(count)])
 
     @property
     def vector(self) -> SX:
@@ -102,7 +101,7 @@ class _Roots:
         return ca.vertcat(*(z.x for z in self.z), *(z.y for z in self.z))
 
 
-def _coefficients(values: SX, degree: int) -> tuple[SX, SX]:
+def coefficients(values: SX, degree: int) -> tuple[SX, SX]:
     """Return the coefficients of f = sum c_k z^k for k from -degree to degree, and their error.
 
     They are c_0, the real and then the imaginary parts of c_1 to c_degree, and the largest of absolute value is 1. The
@@ -126,65 +125,72 @@ def _coefficients(values: SX, degree: int) -> tuple[SX, SX]:
 
 
 def _stepped(polynomial: list[Extension], roots: _Roots) -> tuple[_Roots, SX]:
-    """Return the estimates after a step of Aberth's method, and the largest step as a share of |z|.
-
-    Each estimate moves by
-
-        -p / (p' - p sum_j 1 / (z - z_j)),
-
-    which is Newton's step for p over the product of all other z - z_j (Aberth 1973, Math. Comp. 27). A step counts as 0
-    where p is 0 up to rounding, as it is in a whole neighbourhood of a double root.
-    """
-    sums = [_complex(ca.SX(0.0), ca.SX(0.0)) for _ in roots.z]
+    """Return the estimates after a step of Aberth's method, and the largest step as a share of |z|."""
+    sums = [complex_of(ca.SX(0.0), ca.SX(0.0)) for _ in roots.z]
     for i, root in enumerate(roots.z):
         for j in range(i):
             one_over = (root - roots.z[j]).inverse
             sums[i] = sums[i] + one_over
             sums[j] = sums[j] - one_over
 
-    sizes = [ca.sqrt(c.x * c.x + c.y * c.y) for c in polynomial]
-    moved = []
-    steps = []
-    for root, repulsion in zip(roots.z, sums, strict=True):
-        p, slope = _horner(polynomial, root)
-        step = p * (slope - p * repulsion).inverse
-        length = ca.sqrt(step.x * step.x + step.y * step.y)
-        is_finite = length < 1e300
-        step = _complex(ca.if_else(is_finite, step.x, 0.0), ca.if_else(is_finite, step.y, 0.0))
-        moved.append(root - step)
+    sizes = sizes_of(polynomial)
+    both = [
+        aberth_step(polynomial, sizes, root, repulsion)
+        for root, repulsion in zip(roots.z, sums, strict=True)
+    ]
+    return _Roots([moved for moved, _ in both]), reduce(ca.fmax, (step for _, step in both))
 
-        radius = ca.sqrt(root.x * root.x + root.y * root.y)
-        largest = reduce(lambda value, size: value * radius + size, sizes)
-        is_root = ca.fabs(p.x) + ca.fabs(p.y) < _ROUNDING * largest
-        steps.append(ca.if_else(is_root, 0.0, length / radius))
-    return _Roots(moved), reduce(ca.fmax, steps)
+
+def aberth_step(
+    polynomial: list[Extension], sizes: list[SX], root: Extension, repulsion: Extension
+) -> tuple[Extension, SX]:
+    """Return an estimate after a step of Aberth's method, and the step as a share of |z|.
+
+    The estimate moves by
+
+        -p / (p' - p sum_j 1 / (z - z_j)),
+
+    which is Newton's step for p over the product of all other z - z_j (Aberth 1973, Math. Comp. 27). A step counts as 0
+    where p is 0 up to rounding, as it is in a whole neighbourhood of a double root.
+
+    Parameters
+    ----------
+    polynomial, sizes
+        Coefficients, highest first, and their absolute values.
+    root
+        The estimate z.
+    repulsion
+        The sum of 1 / (z - z_j) over the other estimates.
+    """
+    p, slope = _value_and_slope(polynomial, root)
+    step = p * (slope - p * repulsion).inverse
+    length = ca.sqrt(step.x * step.x + step.y * step.y)
+    is_finite = length < 1e300
+    step = complex_of(ca.if_else(is_finite, step.x, 0.0), ca.if_else(is_finite, step.y, 0.0))
+
+    radius = ca.sqrt(root.x * root.x + root.y * root.y)
+    largest = reduce(lambda value, size: value * radius + size, sizes)
+    is_root = ca.fabs(p.x) + ca.fabs(p.y) < _ROUNDING * largest
+    return root - step, ca.if_else(is_root, 0.0, length / radius)
 
 
 def _real_roots(polynomial: list[Extension], roots: _Roots, error: SX) -> dict[str, SX]:
     """Return the outputs of :func:`roots_program`."""
-    tolerance = ca.fmax(_ERROR_OF_VALUE, error)
+    tolerance = ca.fmax(ERROR_OF_VALUE, error)
     near = []
     heights = []
     are_real = []
     for root in roots.z:
-        square = root.x * root.x + root.y * root.y
-        # ln(square) / 2 of a square near 1, up to its cube.
-        height = ca.fabs((square - 1.0) / (square + 1.0))
-        # f = p / z^degree and |z| is about 1: |f'| = |p'| at a root, and f is height f' at the real angle beside it.
-        _, slope = _horner(polynomial, root)
-        value = height * ca.sqrt(slope.x * slope.x + slope.y * slope.y)
-        is_tried = ca.logic_and(height < _NEARLY_REAL, value < _MARGIN * tolerance)
-        near.append(ca.if_else(is_tried, ca.atan2(root.y, root.x), BEYOND))
+        angle, height, is_real = nearly_real(polynomial, root, tolerance)
+        near.append(angle)
         heights.append(height)
-        are_real.append(ca.if_else(value < tolerance, 1.0, 0.0))
+        are_real.append(is_real)
 
     is_delicate = ca.SX(0.0) > 0.0
     for i, root in enumerate(roots.z):
         for j in range(i):
-            # e^(i x) - e^(i y) is as long as x - y, through pi too, and heights count like angles.
-            apart = root - roots.z[j]
-            is_near = apart.x * apart.x + apart.y * apart.y < _NEAR_ROOTS**2
-            is_delicate = ca.logic_or(is_delicate, ca.logic_and(is_near, heights[i] < _NEAR_ROOTS))
+            is_near = are_near(root, roots.z[j])
+            is_delicate = ca.logic_or(is_delicate, ca.logic_and(is_near, heights[i] < NEAR_ROOTS))
     return {
         "angle": ca.vertcat(*near),
         "is_real": ca.vertcat(*are_real),
@@ -193,17 +199,63 @@ def _real_roots(polynomial: list[Extension], roots: _Roots, error: SX) -> dict[s
     }
 
 
-def _complex(x: SX, y: SX) -> Extension:
+def sizes_of(polynomial: list[Extension]) -> list[SX]:
+    """Return the absolute values of coefficients."""
+    return [ca.sqrt(c.x * c.x + c.y * c.y) for c in polynomial]
+
+
+def nearly_real(polynomial: list[Extension], root: Extension, tolerance: SX) -> tuple[SX, SX, SX]:
+    """Return angle, height and whether it is real of a root, as :func:`roots_program` has them.
+
+    Parameters
+    ----------
+    polynomial, root
+        The polynomial, and its root.
+    tolerance
+        Error of the polynomial's value.
+    """
+    square = root.x * root.x + root.y * root.y
+    # ln(square) / 2 of a square near 1, up to its cube.
+    height = ca.fabs((square - 1.0) / (square + 1.0))
+    # f = p / z^degree and |z| is about 1: |f'| = |p'| at a root, and f is height f' at the real angle beside it.
+    _, slope = _value_and_slope(polynomial, root)
+    value = height * ca.sqrt(slope.x * slope.x + slope.y * slope.y)
+    is_tried = ca.logic_and(height < _NEARLY_REAL, value < _MARGIN * tolerance)
+    angle = ca.if_else(is_tried, ca.atan2(root.y, root.x), BEYOND)
+    return angle, height, ca.if_else(value < tolerance, 1.0, 0.0)
+
+
+def are_near(root: Extension, other: Extension) -> SX:
+    """Return whether two roots nearly coincide."""
+    # e^(i x) - e^(i y) is as long as x - y, through pi too, and heights count like angles.
+    apart = root - other
+    return apart.x * apart.x + apart.y * apart.y < NEAR_ROOTS**2
+
+
+def complex_of(x: SX, y: SX) -> Extension:
     """Return x + i y."""
     return Extension(x, y, _IMAGINARY_UNIT)
 
 
-def _polynomial(numbers: SX, degree: int) -> list[Extension]:
+def polynomial_of(numbers: SX, degree: int) -> list[Extension]:
     """Return the coefficients from that of z^(2 degree) to that of z^0: c_degree, ..., c_0, ..., conj(c_degree)."""
-    upper = [_complex(numbers[k], numbers[degree + k]) for k in range(degree, 0, -1)]
-    middle = _complex(numbers[0], 0.0)
-    lower = [_complex(c.x, -c.y) for c in reversed(upper)]
+    upper = [complex_of(numbers[k], numbers[degree + k]) for k in range(degree, 0, -1)]
+    middle = complex_of(numbers[0], 0.0)
+    lower = [complex_of(c.x, -c.y) for c in reversed(upper)]
     return [*upper, middle, *lower]
+
+
+def _value_and_slope(polynomial: list[Extension], x: Extension) -> tuple[Extension, Extension]:
+    """Return the value of a polynomial of even degree, highest coefficient first, and that of its derivative.
+
+    With w = x^2 and p(x) = e(w) + x o(w) the slope is 2 x e'(w) + o(w) + 2 w o'(w). The chains of sums and products are
+    half as long as Horner's for x, and the processor works on both at a time.
+    """
+    w = x * x
+    even, slope_of_even = _horner(polynomial[::2], w)
+    odd, slope_of_odd = _horner(polynomial[1::2], w)
+    slope = (x * slope_of_even + w * slope_of_odd) * 2.0 + odd
+    return even + x * odd, slope
 
 
 def _horner(polynomial: list[Extension], x: Extension) -> tuple[Extension, Extension]:

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description
 from dhkit.kernels import Kernel
 from dhkit.kinematics.numeric import refined
-from dhkit.kinematics.polynomial import trigonometric
 
 _CHUNK = 1_024
 """Poses that are solved together; their arrays take some 10 MB."""
-_CLOSES = 1e-14
+CLOSES = 1e-13
 """Error of starts that need no iteration: share of the reach, and rad."""
-_INEXACT = 1e-6
+INEXACT = 1e-6
 """Largest coefficient beyond degree 8, relative to the others, of a polynomial that is trusted."""
+SAME_ANGLE = 1e-6
+"""Angles that differ by less, rad, count as equal when solutions are sorted."""
 _SAME_SOLUTION = 1e-5
 """Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
 _NUMBERED = 3
@@ -37,20 +38,28 @@ class Elimination(Protocol):
     def kernels(self) -> Sequence[Kernel]:
         """The kernels that it uses."""
 
-    def first_angle(self, poses: Array) -> Array:
-        """Return the first angle at which the polynomial is evaluated, shape (N,), for poses (N, 16)."""
+    def candidates(self, poses: Array) -> Candidates:
+        """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
 
-    def values(self, poses: Array, angles: Array) -> Array:
-        """Return values of the polynomial, shape (N, S), at angles (N, S)."""
 
-    def starts(
-        self, poses: Array, owner: NDArray[np.intp], angles: Array
-    ) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return indices of roots, joint values (L, 6) and errors (L,), for roots (K,) of poses (N, 16).
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Joint values at the roots of the polynomials of N poses that are real or may be."""
 
-        ``owner`` tells the pose of each root. Joint values are near solutions, rad, in (-pi, pi]; errors are shares of
-        the reach and rad.
-        """
+    q: Array
+    """Shape (L, 6), near solutions, rad, in (-pi, pi]."""
+    error: Array
+    """Their errors, shape (L,), shares of the reach and rad."""
+    owner: NDArray[np.intp]
+    """The pose of each, shape (L,), in ascending order."""
+    root: NDArray[np.intp]
+    """The root of each, shape (L,): some roots have several solutions, which are together."""
+    expected: NDArray[np.intp]
+    """Number of real roots, shape (N,); see :class:`dhkit.kinematics.polynomial.trigonometric.Roots`."""
+    is_delicate: NDArray[np.bool_]
+    """Whether two roots nearly coincide, shape (N,)."""
+    error_of_polynomial: Array
+    """Largest coefficient beyond degree 8, relative to the others, shape (N,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,33 +115,29 @@ def solve(description: Description, elimination: Elimination, poses: Array) -> F
 def _solve(description: Description, elimination: Elimination, poses: Array) -> Found:
     """Return the solutions of a chunk of poses."""
     with np.errstate(all="ignore"):
-        first = elimination.first_angle(poses)
-        values = elimination.values(poses, first[:, None] + trigonometric.angles())
-        roots = trigonometric.real_roots(values)
-        angles = roots.angle + first[roots.owner]
-        of_root, q, error = elimination.starts(poses, roots.owner, angles)
+        found = elimination.candidates(poses)
         # False for errors that are no numbers, as are those of joint values that are none.
-        closed = error <= _CLOSES
+        closed = found.error <= CLOSES
+    q = found.q
     moved = np.flatnonzero(~closed)
     if len(moved):
         moved = moved[np.isfinite(q[moved]).all(axis=1)]
-        goals = poses[roots.owner[of_root[moved]]]
-        q[moved], closed[moved] = refined(description, q[moved], goals)
+        q[moved], closed[moved] = refined(description, q[moved], poses[found.owner[moved]])
 
     # Solutions of a pose that come from roots apart differ in that joint, unless they moved far from their roots.
-    is_doubtful = roots.is_delicate.copy()
-    is_doubtful[roots.owner[of_root[moved]]] = True
+    is_doubtful = found.is_delicate.copy()
+    is_doubtful[found.owner[moved]] = True
     q = q[closed]
-    of_root = of_root[closed]
-    owner = roots.owner[of_root]
-    is_doubtful[owner[1:][of_root[1:] == of_root[:-1]]] = True
+    owner = found.owner[closed]
+    root = found.root[closed]
+    is_doubtful[owner[1:][root[1:] == root[:-1]]] = True
     rows = np.flatnonzero(is_doubtful[owner])
     if len(rows):
         is_one = np.ones(len(q), dtype=bool)
         is_one[rows] = are_distinct(q[rows], owner[rows])
         q = q[is_one]
         owner = owner[is_one]
-    return Found(q, owner, roots.expected, roots.error < _INEXACT, roots.is_delicate)
+    return Found(q, owner, found.expected, found.error_of_polynomial < INEXACT, found.is_delicate)
 
 
 def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:

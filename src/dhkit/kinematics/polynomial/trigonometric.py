@@ -17,6 +17,7 @@ from dhkit.kernels import Kernel, kernel
 from dhkit.symbolic import Loop
 
 DEGREE = 8
+ROOTS = 2 * DEGREE
 SAMPLES = 20
 """Number of values. 17 would do; the other coefficients then tell how exactly the values are a polynomial's."""
 _LARGEST_ANGLE = 3.5
@@ -24,6 +25,14 @@ _LARGEST_ANGLE = 3.5
 _WELL_KNOWN = 1e-12
 """Error of the coefficients above which every root that is nearly real counts as one; usually it is some 1e-15."""
 _NO_PARAMETERS = np.zeros(1)
+
+# What is known of a root.
+NONE = 0.0
+"""It is not real: there is no solution."""
+SOLUTION = 1.0
+"""There is one solution, and it is not singular."""
+DOUBTFUL = 2.0
+"""It may be real, has several solutions or one that does not close, or nearly coincides with another root."""
 
 
 def angles() -> Array:
@@ -58,8 +67,8 @@ def real_roots(values: Array) -> Roots:
         Values at equally spaced angles, shape (N, SAMPLES).
     """
     count = len(values)
-    angle = np.empty((count, 2 * DEGREE))
-    is_real = np.empty((count, 2 * DEGREE))
+    angle = np.empty((count, ROOTS))
+    is_real = np.empty((count, ROOTS))
     is_delicate = np.empty((count, 1))
     error = np.empty((count, 1))
     run = roots_kernel()
@@ -69,11 +78,26 @@ def real_roots(values: Array) -> Roots:
     # NaN, where values are not finite, is no root.
     is_near = angle < _LARGEST_ANGLE
     owner, _ = np.nonzero(is_near)
-    # Near poses at several singularities the coefficients cancel, and roots that are real may look complex.
-    is_counted = is_near & ((is_real > 0) | (error > _WELL_KNOWN))
-    counts = np.count_nonzero(is_counted, axis=1)
-    expected = np.maximum(counts, is_near.any(axis=1))
+    expected = expected_roots(is_near, is_real > 0, error)
     return Roots(owner, angle[is_near], expected, is_delicate[:, 0] > 0, error[:, 0])
+
+
+def expected_roots(
+    is_near: NDArray[np.bool_], is_real: NDArray[np.bool_], error: Array
+) -> NDArray[np.intp]:
+    """Return the number of roots of each polynomial that have a solution, shape (N,); see :class:`Roots`.
+
+    Parameters
+    ----------
+    is_near, is_real
+        Whether a root is nearly real, and whether it is real up to its error, shape (N, K) each.
+    error
+        Of the polynomials, shape (N, 1), as of :class:`Roots`.
+    """
+    # Near poses at several singularities the coefficients cancel, and roots that are real may look complex.
+    is_counted = is_near & (is_real | (error > _WELL_KNOWN))
+    counts = np.count_nonzero(is_counted, axis=1)
+    return np.asarray(np.maximum(counts, is_near.any(axis=1)))
 
 
 def roots_kernel() -> Kernel:

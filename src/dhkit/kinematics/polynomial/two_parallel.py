@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dhkit.cached_property import cached_property
 from dhkit.description import Array
@@ -29,13 +28,16 @@ from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.polynomial.extension import SIGNS
-from dhkit.kinematics.polynomial.trigonometric import SAMPLES
+from dhkit.kinematics.polynomial.solve import Candidates
+from dhkit.kinematics.polynomial.trigonometric import ROOTS, expected_roots
 
 if TYPE_CHECKING:
-    from dhkit.symbolic import Graph
+    from dhkit.symbolic import Graph, Pipeline
 
-_OUTPUTS = {"value": 1, "signs": 2, "joints": 2}
-"""Number of outputs of the programs."""
+DETAILS = 3 + 1 + len(SIGNS)
+"""Number of details of a root."""
+SIZES = (6 * ROOTS, 3 * ROOTS, DETAILS * ROOTS, 1, 1)
+"""Numbers of entries of the outputs of a pose's program."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,10 @@ class TwoParallel:
 
     @cached_property
     def parameters(self) -> Array:
-        """The numbers of the programs, shape (49,), lengths as shares of the reach: see :func:`_named`."""
+        """The arm's numbers in the programs, shape (49,), lengths as shares of the reach.
+
+        See :class:`dhkit.kinematics.polynomial.two_parallel_program.Numbers`.
+        """
         chain = self.chain
         first = inverse_pose(chain.T_world_first)
         last = inverse_pose(chain.T_last_tool)
@@ -90,94 +95,71 @@ class TwoParallel:
     @property
     def kernels(self) -> Sequence[Kernel]:
         """The kernels of the programs."""
-        return [_kernel(name, self.meeting) for name in _OUTPUTS]
+        return [self.pose_kernel, self._joints_kernel]
 
-    def first_angle(self, poses: Array) -> Array:
-        """Return the first angle at which the polynomial is evaluated, shape (N,), rad.
+    @property
+    def pose_kernel(self) -> Kernel:
+        """The kernel of :func:`dhkit.kinematics.polynomial.two_parallel_pose.pose_program`."""
 
-        Where k and axis 6 are parallel, a denominator is 0. The two angles at which they are nearest to parallel, pi
-        apart, lie in the middle between two of the angles.
-        """
-        chain = self.chain
-        R_first_world = chain.T_world_first[:3, :3].T
-        axis_6 = poses.reshape(-1, 4, 4)[:, :3, :3] @ chain.T_last_tool[:3, :3].T[:, 2]
-        axis_6 = axis_6 @ R_first_world.T
-        # In the first frame, k at q1 = 0 is Rx(alpha_1) (0, 0, 1), and joint 1 turns it about z.
-        of_k = np.arctan2(-np.sin(chain.alpha[0]), 0.0)
-        nearest = np.arctan2(axis_6[:, 1], axis_6[:, 0]) - of_k
-        return np.asarray(nearest + np.pi / SAMPLES)
+        def derived() -> Pipeline:
+            from dhkit.kinematics.polynomial.two_parallel_pose import pose_program
 
-    def values(self, poses: Array, angles: Array) -> Array:
-        """Return the polynomial's values.
+            return pose_program(self.meeting)
 
-        Parameters
-        ----------
-        poses
-            Poses of the tool in the world, shape (N, 16), m.
-        angles
-            Angles of joint 1, shape (N, S), rad.
-        """
-        run = _kernel("value", self.meeting)
-        pairs = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(-1, 2)
-        values = np.empty((angles.size, 1))
-        run(self.parameters, [np.repeat(poses, angles.shape[1], axis=0), pairs], [values])
-        return values.reshape(angles.shape)
+        types = ("float64",) * len(SIZES)
+        return kernel("two_parallel_pose", f"{self.meeting}", derived, types, is_loop=True)
 
-    def starts(
-        self, poses: Array, owner: NDArray[np.intp], angles: Array
-    ) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return joint values near the solutions at roots of the polynomial.
+    @property
+    def _joints_kernel(self) -> Kernel:
+        def derived() -> Graph:
+            from dhkit.kinematics.polynomial.two_parallel_program import joints_program
 
-        Parameters
-        ----------
-        poses
-            Shape (N, 16), m.
-        owner, angles
-            Index of each root's pose, and the roots, shape (K,) each, rad.
+            return joints_program(self.meeting)
 
-        Returns
-        -------
-        tuple[NDArray[np.intp], Array, Array]
-            Indices of the roots, shape (L,), ascending; joint values, shape (L, 6), rad, in (-pi, pi]; and their
-            errors, shares of the reach and rad, shape (L,). A root that serves several combinations of signs has
-            several solutions.
-        """
-        count = len(angles)
-        poses = poses[owner]
-        q_1 = angles[:, None]
-        signs = np.empty((count, 2))
-        also = np.empty((count, len(SIGNS)))
-        _kernel("signs", self.meeting)(self.parameters, [poses, q_1], [signs, also])
-        rows = np.arange(count)
-        if (also > 0).any():
-            more, choice = np.nonzero(also > 0)
-            rows = np.concatenate([rows, more])
-            order = np.argsort(rows, kind="stable")
-            rows = rows[order]
-            signs = np.concatenate([signs, np.array(SIGNS)[choice]])[order]
-            poses = poses[rows]
-            q_1 = q_1[rows]
+        return kernel("two_parallel_joints", f"{self.meeting}", derived, ("float64",) * 2)
 
-        q = np.empty((len(rows), 6))
-        error = np.empty((len(rows), 1))
-        _kernel("joints", self.meeting)(self.parameters, [poses, q_1, signs], [q, error])
-        return rows, q, error[:, 0]
+    def candidates(self, poses: Array) -> Candidates:
+        """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
+        # Limits do not matter here.
+        parameters = np.concatenate([self.parameters, np.full(6, -np.inf), np.full(6, np.inf)])
+        results = [np.empty((len(poses), size)) for size in SIZES]
+        self.pose_kernel(parameters, [poses], results)
+        joints_of_pose, _, details_of_pose, _, error_of_polynomial = results
+        joints = joints_of_pose.reshape(-1, ROOTS, 6)
+        details = details_of_pose.reshape(-1, ROOTS, DETAILS)
+        is_near, is_real, is_double = np.moveaxis(details[:, :, :3] > 0.0, -1, 0)
+        owner, place = np.nonzero(is_near)
+        root = np.arange(len(owner))
+        q = joints[owner, place]
+        error = details[owner, place, 3]
+        also = details[owner, place, 4:]
+        if (also > 0.0).any():
+            # Roots that serve several combinations of signs have several solutions.
+            rows, choice = np.nonzero(also > 0.0)
+            more, errors = self._with_signs(
+                poses[owner[rows]], q[rows, :1], np.array(SIGNS)[choice]
+            )
+            root = np.concatenate([root, rows])
+            order = np.argsort(root, kind="stable")
+            root = root[order]
+            q = np.concatenate([q, more])[order]
+            error = np.concatenate([error, errors])[order]
+        return Candidates(
+            q,
+            error,
+            owner[root],
+            root,
+            expected_roots(is_near, is_real, error_of_polynomial),
+            is_double.any(axis=1),
+            error_of_polynomial[:, 0],
+        )
 
-
-def _kernel(name: str, meeting: tuple[int, int]) -> Kernel:
-    """Return the kernel of one of the programs."""
-
-    def derived() -> Graph:
-        from dhkit.kinematics.polynomial import two_parallel_program as programs
-
-        derive = {
-            "value": programs.value_program,
-            "signs": programs.signs_program,
-            "joints": programs.joints_program,
-        }
-        return derive[name](meeting)
-
-    return kernel(f"two_parallel_{name}", f"{meeting}", derived, ("float64",) * _OUTPUTS[name])
+    def _with_signs(self, poses: Array, q_1: Array, signs: Array) -> tuple[Array, Array]:
+        """Return joint values (K, 6), rad, and errors (K,) of poses (K, 16) near roots (K, 1) with signs (K, 2)."""
+        q = np.empty((len(poses), 6))
+        error = np.empty((len(poses), 1))
+        self._joints_kernel(self.parameters, [poses, q_1, signs], [q, error])
+        return q, error[:, 0]
 
 
 def _scaled(T: Array, length: float) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, TypeAlias
 
 import casadi as ca
@@ -27,45 +28,37 @@ _POLISHING_STEPS = 2
 """Newton steps from a root of the polynomial, whose error is about 1e-10 rad, to rounding."""
 _LARGEST_STEP = 1e-3
 """Larger steps, rad, are not taken: near a double root they lead elsewhere."""
+_REGULAR_SLOPE = 1e-2
+_REGULAR_SQUARE = 1e-4
+"""Least |F'| and least square of a solution that is known to be regular."""
 _ALSO_FITS = 1e-6
 """Residual, a share of the squared reach, of combinations of signs that may also be solutions: two at the same q1."""
 
 
-def value_program(meeting: tuple[int, int]) -> Graph:
-    """Return the program of the polynomial's value: pose T and theta_1, as cosine and sine, to the value.
+def polynomial_value(p: Numbers, meeting: tuple[int, int], T: SX, theta_1: Pair) -> SX:
+    """Return the polynomial's value at theta_1 for the pose T of the tool, 4 x 4.
 
     It is the product of F over both signs of both roots, times the denominators in F.
     """
-    parameters, T = _symbols()
-    theta_1 = ca.SX.sym("theta_1", 2)
     arm = _assembled(
-        _Numbers.read(parameters),
-        meeting,
-        T[:3, :],
-        (theta_1[0], theta_1[1]),
-        lambda square, level: Root(square, level).element,
+        p, meeting, T[:3, :], theta_1, lambda square, level: Root(square, level).element
     )
     square_of_h, square_of_u = arm.denominators
-    value = arm.F.norm.norm * square_of_h.norm * square_of_u * square_of_u
-    inputs = {"parameters": parameters, "T": T, "theta_1": theta_1}
-    return Graph.of("two_parallel_value", inputs, {"value": value})
+    return arm.F.norm.norm * square_of_h.norm * square_of_u * square_of_u
 
 
-def signs_program(meeting: tuple[int, int]) -> Graph:
-    """Return the program that tells which signs fit: T and q1 near a root of F to the signs, NaN if there are none.
+def fitting_signs(p: Numbers, meeting: tuple[int, int], T: SX, q_1: SX) -> tuple[SX, SX]:
+    """Return which signs fit at q1 near a root of F, NaN if there are none, and which others do.
 
-    ``signs`` are those with the least residual: |F| and by how much squares are negative. ``also`` tells of each
-    combination, but for that one, whether it fits too.
+    The signs are those with the least residual: |F| and by how much squares are negative. The second result tells of
+    each combination in ``SIGNS``, but for that one, whether it fits too.
     """
-    parameters, T = _symbols()
-    q_1 = ca.SX.sym("q_1")
-    p = _Numbers.read(parameters)
     # A comparison with NaN is false: residuals that are no numbers fit nothing.
     least = ca.SX(math.inf)
     signs = ca.SX([math.nan, math.nan])
     residuals = []
     for some in SIGNS:
-        arm, deficit = _real(p, meeting, T, q_1, some)
+        arm, deficit, _ = _real(p, meeting, T, q_1, some)
         residual = ca.fabs(arm.F) + deficit
         residuals.append(residual)
         is_better = residual < least
@@ -75,8 +68,7 @@ def signs_program(meeting: tuple[int, int]) -> Graph:
     for some, residual in zip(SIGNS, residuals, strict=True):
         is_chosen = ca.logic_and(signs[0] == some[0], signs[1] == some[1])
         also.append(ca.logic_and(residual <= _ALSO_FITS, ca.logic_not(is_chosen)))
-    inputs = {"parameters": parameters, "T": T, "q_1": q_1}
-    return Graph.of("two_parallel_signs", inputs, {"signs": signs, "also": ca.vertcat(*also)})
+    return signs, ca.vertcat(*also)
 
 
 def joints_program(meeting: tuple[int, int]) -> Graph:
@@ -85,13 +77,30 @@ def joints_program(meeting: tuple[int, int]) -> Graph:
     It takes Newton steps q1 - F / F'. Angles are in (-pi, pi]. The error is the larger one of position, a share of the
     reach, and rotation, rad, for which its sine is taken.
     """
-    parameters, T = _symbols()
+    parameters, T = symbols()
     q_1 = ca.SX.sym("q_1")
     signs = ca.SX.sym("signs", 2)
-    p = _Numbers.read(parameters)
+    q, error, _ = solution_function(meeting)(parameters, T, q_1, signs)
+    inputs = {"parameters": parameters, "T": T, "q_1": q_1, "signs": signs}
+    return Graph.of("two_parallel_joints", inputs, {"q": q, "error": error})
 
-    arm, _ = _real(p, meeting, T, q_1, (signs[0], signs[1]))
-    step = arm.F / ca.jacobian(arm.F, q_1)
+
+def solution_function(meeting: tuple[int, int]) -> ca.Function:
+    """Return the function of :func:`joints_program`: parameters, T, q1 and signs to q, its error, and if it is regular.
+
+    A solution is singular where F' is 0, or a square whose root is taken, or a denominator. Solutions at nearly equal
+    roots of the polynomial may well be regular: those of an elbow above and below belong to different signs.
+    """
+    parameters, T = symbols()
+    q_1 = ca.SX.sym("q_1")
+    signs = ca.SX.sym("signs", 2)
+    p = Numbers.read(parameters)
+
+    arm, _, least_square = _real(p, meeting, T, q_1, (signs[0], signs[1]))
+    slope = ca.jacobian(arm.F, q_1)
+    roots = reduce(ca.fmin, (least_square, *arm.denominators))
+    is_regular = ca.logic_and(ca.fabs(slope) > _REGULAR_SLOPE, roots > _REGULAR_SQUARE)
+    step = arm.F / slope
     is_small = ca.fabs(step) < _LARGEST_STEP
     better = ca.Function(
         "better", [parameters, T, q_1, signs], [ca.if_else(is_small, q_1 - step, q_1)]
@@ -100,7 +109,7 @@ def joints_program(meeting: tuple[int, int]) -> Graph:
     for _ in range(_POLISHING_STEPS):
         x = better(parameters, T, x, signs)
 
-    arm, _ = _real(p, meeting, T, x, (signs[0], signs[1]))
+    arm, _, _ = _real(p, meeting, T, x, (signs[0], signs[1]))
     # Link 2 has the direction q2, link 3 that of q2 + sense q3.
     sense = p.alpha[2][0]
     theta_2 = ca.atan2(arm.link_2[1], arm.link_2[0])
@@ -111,14 +120,13 @@ def joints_program(meeting: tuple[int, int]) -> Graph:
     thetas = [theta_2, theta_3, *(ca.atan2(sine, cosine) for cosine, sine in arm.wrist)]
     q = [x, *(theta - p.offset[k] for k, theta in enumerate(thetas, start=1))]
     q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
-    inputs = {"parameters": parameters, "T": T, "q_1": q_1, "signs": signs}
-    outputs = {"q": ca.vertcat(*q), "error": _error(p, T, q)}
-    return Graph.of("two_parallel_joints", inputs, outputs)
+    outputs = [ca.vertcat(*q), _error(p, T, q), is_regular]
+    return ca.Function("solution", [parameters, T, q_1, signs], outputs)
 
 
-def _error(p: _Numbers, T: SX, q: list[SX]) -> SX:
+def _error(p: Numbers, T: SX, q: list[SX]) -> SX:
     """Return the error of the tool's pose at joint values."""
-    R_goal, p_goal = _last_frame(p, T)
+    R_goal, p_goal = last_frame(p, T)
     R = ca.SX.eye(3)
     position = ca.SX.zeros(3)
     for k, angle in enumerate(q, start=1):
@@ -146,27 +154,29 @@ def _rotation(axis: int, cosine: SX, sine: SX) -> SX:
     return ca.diagcat(turn, 1.0) if axis == 2 else ca.diagcat(1.0, turn)
 
 
-def _symbols() -> tuple[SX, SX]:
+def symbols() -> tuple[SX, SX]:
+    """Return symbols for the parameters and the tool's pose."""
     return ca.SX.sym("parameters", COUNT), ca.SX.sym("T", 4, 4)
 
 
 def _real(
-    p: _Numbers, meeting: tuple[int, int], T: SX, q_1: SX, signs: tuple[SX, SX]
-) -> tuple[_Arms, SX]:
-    """Return the arm with roots of given signs, and the sum of the negative squares, which count as 0."""
-    deficits = []
+    p: Numbers, meeting: tuple[int, int], T: SX, q_1: SX, signs: tuple[SX, SX]
+) -> tuple[_Arms, SX, SX]:
+    """Return the arm with roots of given signs, the sum of negative squares (counted as 0), and the least square."""
+    squares = []
 
     def take_root(square: Element, level: int) -> Element:
-        deficits.append(ca.fmax(-square, 0.0))
+        squares.append(square)
         return signs[level - 1] * ca.sqrt(ca.fmax(square, 0.0))
 
     theta_1 = (ca.cos(q_1), ca.sin(q_1))
     arm = _assembled(p, meeting, T[:3, :], theta_1, take_root)
-    return arm, deficits[0] + deficits[1]
+    first, second = squares
+    return arm, ca.fmax(-first, 0.0) + ca.fmax(-second, 0.0), ca.fmin(first, second)
 
 
 @dataclass(frozen=True)
-class _Numbers:
+class Numbers:
     """The parameters by name; dictionaries count joints from 1."""
 
     per_length: SX
@@ -181,7 +191,7 @@ class _Numbers:
     """3 x 4."""
 
     @classmethod
-    def read(cls, parameters: SX) -> _Numbers:
+    def read(cls, parameters: SX) -> Numbers:
         """Return the parameters by name."""
         sizes = (1, 6, 5, 5, 10, 12, 12)
         ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
@@ -215,7 +225,7 @@ class _Arms:
 
 
 def _assembled(
-    p: _Numbers, meeting: tuple[int, int], T: SX, theta_1: Pair, take_root: TakeRoot
+    p: Numbers, meeting: tuple[int, int], T: SX, theta_1: Pair, take_root: TakeRoot
 ) -> _Arms:
     """Return the arm with joint 1 at theta_1 and a choice of the roots."""
     R, position = _seen_from_link_1(p, T, theta_1)
@@ -289,9 +299,9 @@ def _assembled(
     return _Arms(F, (square_of_h, square_of_u), link_2, link_3, (theta_4, theta_5, theta_6))
 
 
-def _seen_from_link_1(p: _Numbers, T: SX, theta_1: Pair) -> tuple[SX, Vector]:
+def _seen_from_link_1(p: Numbers, T: SX, theta_1: Pair) -> tuple[SX, Vector]:
     """Return rotation (3 x 3) and position of the last frame behind joint 1 and link 1."""
-    R, position = _last_frame(p, T)
+    R, position = last_frame(p, T)
 
     def seen(vector: Vector) -> Vector:
         """Return a vector of frame 0 as seen behind joint 1."""
@@ -306,7 +316,7 @@ def _seen_from_link_1(p: _Numbers, T: SX, theta_1: Pair) -> tuple[SX, Vector]:
     )
 
 
-def _last_frame(p: _Numbers, T: SX) -> tuple[SX, SX]:
+def last_frame(p: Numbers, T: SX) -> tuple[SX, SX]:
     """Return rotation (3 x 3) and position (3 x 1) of the last frame in frame 0, from the tool's pose in the world."""
     R = p.T_first_world[:, :3] @ T[:3, :3]
     position = p.T_first_world[:, :3] @ (T[:3, 3] * p.per_length) + p.T_first_world[:, 3]

@@ -1,0 +1,153 @@
+"""Inverse kinematics by elimination of one pose by a compiled function; see :mod:`dhkit.kernels.single_calls`."""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Array, Description, world_to_tool
+from dhkit.kernels import FastCall, SingleCall, never
+from dhkit.kernels.background import Background
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES
+from dhkit.kinematics.eliminated import branch_names, elimination_kernels, has_curves
+from dhkit.kinematics.polynomial.six_joints import six_joints
+from dhkit.kinematics.polynomial.solve import INEXACT
+from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, ROOTS, SOLUTION
+from dhkit.kinematics.polynomial.two_parallel import DETAILS, TwoParallel
+from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
+
+log = logging.getLogger(__name__)
+
+_PACKED = struct.Struct(f"{3 * ROOTS}d{8 * DETAILS * ROOTS}xdd")
+"""What is known of the roots, whether T is a pose, and the error of its polynomial; details are left out."""
+_NO_DISTANCE = bytes(8)
+_STATUS = bytes([IKStatus.ok])
+_INSIDE = 0
+_OUTSIDE = int(IKFlag.out_of_limits)
+
+
+class EliminatedPoseCall:
+    """All solutions of one pose of an arm with parallel axes 2 and 3, or None of what it does not take.
+
+    It does not take poses without solutions, nor those of which two solutions nearly coincide or one does not close.
+    """
+
+    def __init__(self, description: Description, arm: TwoParallel) -> None:
+        numbers = description.numbers
+        middle = np.arange(1.0, description.n + 1.0) / description.n
+        self._description = description
+        self._shared: dict[int, dict[str, object]] = {}
+        self._call: FastCall = SingleCall(
+            arm.pose_kernel,
+            np.concatenate([arm.parameters, numbers.lower, numbers.upper]),
+            (ROOTS, description.n),
+            install=self._install,
+            example=[world_to_tool(description, middle)],
+        )
+
+    def _install(self, call: FastCall) -> None:
+        self._call = call
+
+    def compile(self) -> None:
+        """Compile the function now, and the kernels of the ordinary way."""
+        for one in elimination_kernels(self._description):
+            one.compile()
+        if isinstance(self._call, SingleCall):
+            self._call.compile()
+
+    def __call__(self, T: Any, out: Array | None) -> IKSolutions | None:
+        """Return the solutions.
+
+        Parameters
+        ----------
+        T
+            Pose of the tool in the world, shape (4, 4), m.
+        out
+            None is taken.
+        """
+        if out is not None or type(T) is not np.ndarray or T.ndim != 2:
+            return None
+        found = self._call(T, None)
+        if found is None:
+            return None
+        q, packed = found
+        *roots, posed, error = _PACKED.unpack(packed)
+        kinds = roots[::3]
+        # False for NaN.
+        is_known = posed == 1.0 and error < INEXACT
+        if not is_known or DOUBTFUL in kinds:
+            return None
+        places = [k for k, kind in enumerate(kinds) if kind == SOLUTION]
+        count = len(places)
+        # Complex roots come in pairs. The ordinary way says whether a pose without solutions is out of reach.
+        if count == 0 or count % 2:
+            return None
+        places.sort(key=roots[1::3].__getitem__)
+        are_outside = roots[2::3]
+        flags = bytes(count)
+        if 1.0 in are_outside:
+            flags = bytes([_OUTSIDE if are_outside[k] else _INSIDE for k in places])
+        summary = b"%b%b%b%b" % (_NO_DISTANCE, b"\1" * count, flags, _STATUS)
+        shared = self._shared.get(count) or self._shared_by(count)
+        return IKSolutions.of_packed(q.take(places, 0), summary, shared)
+
+    def _shared_by(self, count: int) -> dict[str, object]:
+        """Return what all poses with so many solutions share, see :meth:`IKSolutions.of_packed`."""
+        self._shared[count] = {
+            "branches": branch_names(count),
+            "met": ALL_COORDINATES,
+            "description": self._description,
+            "batch": (),
+        }
+        return self._shared[count]
+
+
+class EliminationCall:
+    """Takes no pose, but counts calls: the kernels of an elimination are compiled after many, in a thread.
+
+    Otherwise they would stay interpreted, because small batches do not count towards compiling.
+    """
+
+    def __init__(self, description: Description, install: Callable[[FastCall], None]) -> None:
+        self._description = description
+        self._install = install
+        self._background = Background("elimination", self._compile_in_thread)
+
+    def __call__(self, *_: object) -> None:
+        """Count a call."""
+        self._background.count()
+
+    def compile(self) -> None:
+        """Compile the kernels now."""
+        for one in elimination_kernels(self._description):
+            one.compile()
+        self._install(never)
+
+    def _compile_in_thread(self) -> None:
+        try:
+            self.compile()
+        except Exception as error:
+            log.warning("single calls of inverse kinematics stay interpreted (%s)", error)
+            self._install(never)
+
+
+def elimination_call(
+    description: Description, install: Callable[[FastCall], None]
+) -> EliminatedPoseCall | EliminationCall:
+    """Return the function of an arm of six revolute joints without a closed form.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    install
+        Called with the function that takes the place of this one.
+    """
+    arm = six_joints(description).two_parallel
+    if arm is None or has_curves(description):
+        return EliminationCall(description, install)
+    return EliminatedPoseCall(description, arm)

@@ -1,0 +1,114 @@
+"""Programs of steps with different numbers of items: one pose, then 20 angles, then 16 roots, then 16 solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from dhkit.display import counted, repr_line
+from dhkit.symbolic.programs.graph import Graph, Variable
+from dhkit.symbolic.programs.loop import Loop
+
+INDEX = "index"
+"""The source of an input that is the number of the item, from 0."""
+
+
+@dataclass(frozen=True)
+class PipelineStep:
+    """A straight-line program that is run for several items, in the lanes of vectors where there are more than one.
+
+    Attributes
+    ----------
+    graph
+        The program; its first input holds the parameters.
+    items
+        Number of items.
+    each
+        Where each item's inputs come from, by the input's name: an output of an earlier step with as many items, or
+        ``INDEX``. An input that has its source's name need not be here.
+    shared
+        Sources of inputs that all items share, likewise: an input of the pipeline, or all items of an output, one entry
+        after the other.
+    most
+        Largest number of times that the step is run, until its last output, ``goes_on``, is 0 for all items. Its other
+        outputs take the place of earlier ones of the same names.
+    """
+
+    graph: Graph
+    items: int = 1
+    each: Mapping[str, str] = field(default_factory=dict)
+    shared: Mapping[str, str] = field(default_factory=dict)
+    most: int = 1
+
+    @property
+    def outputs(self) -> tuple[Variable, ...]:
+        """The outputs that later steps can use."""
+        return self.graph.outputs[:-1] if self.most > 1 else self.graph.outputs
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """Steps that are run one after the other.
+
+    Attributes
+    ----------
+    name
+        An identifier.
+    inputs
+        The parameters and the inputs, each of one item.
+    steps
+        The steps.
+    results
+        Names of the steps' outputs that are the pipeline's, item by item.
+    """
+
+    name: str
+    inputs: tuple[Variable, ...]
+    steps: tuple[PipelineStep, ...]
+    results: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        sizes = {variable.name: (1, variable.size) for variable in self.inputs[1:]}
+        for step in self.steps:
+            for variable in step.graph.inputs[1:]:
+                source, is_shared = self.source(step, variable.name)
+                if source == INDEX:
+                    continue
+                items, size = sizes[source]
+                fits = variable.size == items * size if is_shared else items == step.items
+                if not fits or (not is_shared and variable.size != size):
+                    raise ValueError(
+                        f"{step.graph.name}: {variable.name} has {variable.size} entries, "
+                        f"but {source} has {items} times {size}"
+                    )
+            for variable in step.outputs:
+                sizes[variable.name] = (step.items, variable.size)
+
+    def source(self, step: PipelineStep, name: str) -> tuple[str, bool]:
+        """Return where an input of a step comes from, and whether all items share it."""
+        if name in step.each:
+            return step.each[name], False
+        if name in step.shared:
+            return step.shared[name], True
+        return name, any(variable.name == name for variable in self.inputs)
+
+    @property
+    def sizes(self) -> dict[str, tuple[int, int]]:
+        """Number of items and of entries of an item, by the names of inputs and of the steps' outputs."""
+        sizes = {variable.name: (1, variable.size) for variable in self.inputs[1:]}
+        for step in self.steps:
+            sizes.update({one.name: (step.items, one.size) for one in step.outputs})
+        return sizes
+
+    @property
+    def outputs(self) -> Sequence[Variable]:
+        """The outputs of the pipeline: (items, entries) each."""
+        return [Variable(name, self.sizes[name]) for name in self.results]
+
+    def __repr__(self) -> str:
+        return repr_line(f"Pipeline {self.name}", summary=counted(len(self.steps), "step"))
+
+
+Program: TypeAlias = Graph | Loop | Pipeline
+"""A program that kernels run."""

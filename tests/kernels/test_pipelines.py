@@ -1,0 +1,127 @@
+"""Programs of steps with different numbers of items: interpreted, compiled, and as NumPy computes them."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from dhkit.kernels import SingleCall, kernel
+from dhkit.symbolic import Graph, Pipeline, PipelineStep
+from dhkit.symbolic.programs.graph import Variable
+
+ITEMS = 11
+"""Not a multiple of a vector's lanes."""
+POWER = 3.0
+
+
+def square_roots(most=40):
+    """Return the program of the roots of x, x + 1, ... by Newton's method, and of their sum times a parameter."""
+    factor = ca.SX.sym("factor")
+    x = ca.SX.sym("x")
+    index = ca.SX.sym("index")
+    root = ca.SX.sym("root")
+    square = ca.SX.sym("square")
+    roots = ca.SX.sym("roots", ITEMS)
+    better = (root + square / root) / 2
+    goes_on = ca.if_else(ca.fabs(better - root) > 1e-15 * root, 1.0, 0.0)
+    parameters = {"parameters": factor}
+    steps = (
+        PipelineStep(
+            Graph.of(
+                "first",
+                {**parameters, "x": x, "index": index},
+                {"square": x + index, "root": ca.SX(1.0)},
+            ),
+            ITEMS,
+            each={"index": "index"},
+            shared={"x": "x"},
+        ),
+        PipelineStep(
+            Graph.of(
+                "better",
+                {**parameters, "root": root, "square": square},
+                {"root": better, "goes_on": goes_on},
+            ),
+            ITEMS,
+            most=most,
+        ),
+        PipelineStep(
+            Graph.of("sum", {**parameters, "roots": roots}, {"sum": factor * ca.sum1(roots)}),
+            shared={"roots": "root"},
+        ),
+    )
+    inputs = (Variable("parameters", (1,)), Variable("x", (1,)))
+    return Pipeline("square_roots", inputs, steps, ("root", "sum"))
+
+
+def run_all(run, x):
+    roots = np.empty((len(x), ITEMS))
+    total = np.empty((len(x), 1))
+    run(np.array([POWER]), [x.reshape(-1, 1)], [roots, total])
+    return roots, total[:, 0]
+
+
+@pytest.fixture(scope="module")
+def of_roots():
+    return kernel("test_square_roots", "", square_roots, ("float64",) * 2, is_loop=True)
+
+
+def expected(x):
+    roots = np.sqrt(x[:, None] + np.arange(ITEMS))
+    return roots, POWER * roots.sum(axis=1)
+
+
+def test_interpreted_and_compiled_results_are_those_of_numpy(of_roots):
+    x = np.linspace(0.5, 200.0, 30)
+    for found in (run_all(of_roots._interpreted(), x), run_all(of_roots, x)):
+        for one, other in zip(found, expected(x), strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-14)
+    of_roots.compile()
+    assert "compiled" in repr(of_roots)
+    for one, other in zip(run_all(of_roots, x), expected(x), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-14)
+
+
+def test_results_are_nan_where_an_input_is_not_finite(of_roots):
+    of_roots.compile()
+    x = np.array([2.0, np.nan, np.inf, 3.0])
+    for run in (of_roots, of_roots._interpreted()):
+        roots, total = run_all(run, x)
+        assert np.isnan(roots[1:3]).all() and np.isnan(total[1:3]).all()
+        assert np.isfinite(roots[[0, 3]]).all() and np.isfinite(total[[0, 3]]).all()
+
+
+def test_a_step_is_repeated_so_often_at_most():
+    few = kernel("test_two_steps", "", lambda: square_roots(most=2), ("float64",) * 2)
+    x = np.array([100.0])
+    once = (1 + 100.0) / 2
+    second = (once + 100.0 / once) / 2
+    for _ in range(2):
+        assert run_all(few, x)[0][0, 0] == pytest.approx(second, rel=1e-14)
+        few.compile()
+
+
+def test_single_calls_give_the_same(of_roots):
+    made = []
+    call = SingleCall(
+        of_roots, np.array([POWER]), (ITEMS,), install=made.append, example=[np.array([4.0])]
+    )
+    call.compile()
+    (function,) = made
+    roots, packed = function(np.array([7.0]), None)
+    np.testing.assert_allclose(roots, np.sqrt(7.0 + np.arange(ITEMS)), rtol=1e-14)
+    assert np.frombuffer(packed)[0] == pytest.approx(POWER * roots.sum(), rel=1e-14)
+
+
+def test_inputs_that_do_not_fit_are_refused():
+    factor = ca.SX.sym("factor")
+    x = ca.SX.sym("x", 2)
+    graph = Graph.of("step", {"parameters": factor, "x": x}, {"y": x})
+    with pytest.raises(ValueError, match="step: x has 2 entries, but x has 1 times 3"):
+        Pipeline(
+            "wrong",
+            (Variable("parameters", (1,)), Variable("x", (3,))),
+            (PipelineStep(graph),),
+            ("y",),
+        )
