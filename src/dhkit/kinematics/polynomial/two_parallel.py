@@ -127,7 +127,7 @@ class TwoParallel:
         joints_of_pose, _, details_of_pose, _, error_of_polynomial = results
         joints = joints_of_pose.reshape(-1, ROOTS, 6)
         details = details_of_pose.reshape(-1, ROOTS, DETAILS)
-        is_near, is_real, is_double = np.moveaxis(details[:, :, :3] > 0.0, -1, 0)
+        is_near, is_real, is_delicate = np.moveaxis(details[:, :, :3] > 0.0, -1, 0)
         owner, place = np.nonzero(is_near)
         root = np.arange(len(owner))
         q = joints[owner, place]
@@ -150,7 +150,7 @@ class TwoParallel:
             owner[root],
             root,
             expected_roots(is_near, is_real, error_of_polynomial),
-            is_double.any(axis=1),
+            is_delicate.any(axis=1),
             error_of_polynomial[:, 0],
         )
 

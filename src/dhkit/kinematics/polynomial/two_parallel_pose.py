@@ -70,8 +70,8 @@ def pose_program(meeting: tuple[int, int]) -> Pipeline:
     - ``q``, 16 times 6, rad;
     - ``summary``, 16 times 3: what is known of the root (``NONE``, ``SOLUTION`` or ``DOUBTFUL``), the number by which
       solutions are sorted, and whether a joint is outside its limits;
-    - ``details``, 16 times 8: whether it is nearly real, real, and near to another, the error of its joint values, and
-      which other combinations of signs fit too, see :func:`fitting_signs`;
+    - ``details``, 16 times 8: whether it is nearly real, real, and so near to another that its solution may be
+      singular; the error of its joint values; and which other combinations of signs fit, see :func:`fitting_signs`;
     - ``posed``, whether T is a pose;
     - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
     """
@@ -226,16 +226,15 @@ def _solutions(meeting: tuple[int, int]) -> PipelineStep:
     parameters = _parameters()
     goal = ca.SX.sym("goal", 4, 4)
     angle = ca.SX.sym("angle")
-    is_tried, is_real, is_double = of_root = [
-        ca.SX.sym(name) for name in ("is_tried", "is_real", "is_double")
-    ]
+    of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "is_double")]
+    is_tried, is_real, is_double = of_root
     p = Numbers.read(parameters[:COUNT])
     signs, also = fitting_signs(p, meeting, goal, angle)
     q, error, is_regular = solution_function(meeting)(parameters[:COUNT], goal, angle, signs)
 
     has_more = ca.SX(ca.sum1(also)) > 0.0
-    is_single = ca.logic_or(is_double == 0.0, is_regular)
-    is_alone = ca.logic_and(is_single, ca.logic_not(has_more))
+    is_delicate = ca.logic_and(is_double != 0.0, ca.logic_not(is_regular))
+    is_alone = ca.logic_not(ca.logic_or(is_delicate, has_more))
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
     kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, SOLUTION, DOUBTFUL), NONE)
     q_1, q_2, q_3 = (ca.floor(q[k] / SAME_ANGLE + 0.5) * SAME_ANGLE for k in range(3))
@@ -260,7 +259,16 @@ def _solutions(meeting: tuple[int, int]) -> PipelineStep:
     outputs = {
         "q": ca.vertcat(*joints),
         "summary": ca.vertcat(kind, order, is_outside),
-        "details": ca.vertcat(*of_root, error, also_1, also_2, also_3, also_4),
+        "details": ca.vertcat(
+            is_tried,
+            is_real,
+            ca.if_else(is_delicate, 1.0, 0.0),
+            error,
+            also_1,
+            also_2,
+            also_3,
+            also_4,
+        ),
     }
     return PipelineStep(
         Graph.of("solutions", inputs, outputs),
