@@ -15,6 +15,7 @@ from dhkit.viewer.diagrams import CURVE_COLORS, GRID_COLOR, joint_color, joint_k
 from dhkit.viewer.motion import check_motion
 from dhkit.viewer.notebook import new_figure
 from dhkit.viewer.overlays import AXIS_COLORS
+from dhkit.viewer.papers import fit_to_width
 from dhkit.viewer.scene import PICTURE_TRIAD_SHARE, first_configuration, frame_labels, scene_size
 
 if TYPE_CHECKING:
@@ -30,8 +31,7 @@ _ZOOM = 0.86
 """Zoom that leaves the labels of a box's axes inside the figure."""
 
 
-@singledispatch
-def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
+def plot(value: object, *, q: ArrayLike | None = None, width: float | None = None) -> Figure:
     """Return a figure of a value; a notebook shows it.
 
     Parameters
@@ -41,6 +41,9 @@ def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
     q
         Joint values at which an arm is drawn, shape (n,), rad and m, or a configuration by name; by default its
         ``ready`` configuration, or zero. Other values take no ``q``.
+    width
+        Width of the figure in a paper, mm: 88 for a column of many journals, 180 for a page. Text has the size of
+        print, and in a column diagrams are below each other. Unless given, the figure has the size of a screen.
 
     Returns
     -------
@@ -51,21 +54,32 @@ def plot(value: object, *, q: ArrayLike | None = None) -> Figure:
     ------
     TypeError
         The type has no figure; the message names the types that have one.
+    ValueError
+        ``q`` does not fit; ``width`` is below 30 or above 500 mm.
 
     Examples
     --------
     >>> from dhkit.description.library import library_robot
-    >>> figure = plot(library_robot("puma560"))
-    >>> figure.savefig("puma560.png")  # doctest: +SKIP
+    >>> figure = plot(library_robot("puma560"), width=88)
+    >>> figure.savefig("puma560.pdf")  # doctest: +SKIP
     """
+    figure = figure_of(value) if q is None else figure_of(value, q=q)
+    if width is not None:
+        fit_to_width(figure, width)
+    return figure
+
+
+@singledispatch
+def figure_of(value: object, *, q: ArrayLike | None = None) -> Figure:
+    """Return a value's figure in the size of a screen; see :func:`plot`."""
     description = getattr(value, "description", None)  # an Arm, which this package must not import
     if isinstance(description, Description):
-        return plot(description, q=q)
-    known = sorted(kind.__name__ for kind in plot.registry if kind is not object)
+        return figure_of(description, q=q)
+    known = sorted(kind.__name__ for kind in figure_of.registry if kind is not object)
     raise TypeError(f"no figure of {type(value).__name__}; expected one of {', '.join(known)}")
 
 
-@plot.register(Description)
+@figure_of.register(Description)
 def _(value: Description, *, q: ArrayLike | None = None) -> Figure:
     return plot_arm(value, first_configuration(value) if q is None else q)
 

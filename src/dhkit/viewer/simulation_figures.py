@@ -26,7 +26,7 @@ from dhkit.viewer.diagrams import (
     style_axes,
     torque_diagram,
 )
-from dhkit.viewer.figures import PATH_COLOR, plot
+from dhkit.viewer.figures import PATH_COLOR, figure_of
 from dhkit.viewer.notebook import new_figure
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ _DIAGRAM_MARGIN = 0.12
 """Room beside the diagrams of a comparison, inches: the controllers' names stand between them."""
 
 
-@plot.register(SimulationResult)
+@figure_of.register(SimulationResult)
 def plot_simulation(result: SimulationResult) -> Figure:
     """Return a simulation over time: joint values and torques beside the errors of the joints and of the tool.
 
@@ -170,15 +170,15 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
     return figure
 
 
-@plot.register(Comparison)
+@figure_of.register(Comparison)
 def _(value: Comparison) -> Figure:
     return plot_comparison(value.results)
 
 
-@plot.register(Mapping)
+@figure_of.register(Mapping)
 def _(value: Mapping[str, SimulationResult]) -> Figure:
     if not value or not all(isinstance(result, SimulationResult) for result in value.values()):
-        return plot.dispatch(object)(value)  # refuses it
+        return figure_of.dispatch(object)(value)  # refuses it
     return plot_comparison(value)
 
 

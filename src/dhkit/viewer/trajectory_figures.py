@@ -20,7 +20,7 @@ from dhkit.viewer.diagrams import (
     percent_diagram,
     torque_diagram,
 )
-from dhkit.viewer.figures import draw_path, plot, space_axes
+from dhkit.viewer.figures import draw_path, figure_of, space_axes
 from dhkit.viewer.notebook import new_figure
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ _MAX_PERCENT = 112.0
 """Largest share that a diagram of shares of limits shows, %."""
 
 
-@plot.register(Trajectory)
+@figure_of.register(Trajectory)
 def plot_trajectory(trajectory: Trajectory) -> Figure:
     """Return a figure of joint values, rates and torques over time, beside the tool's path.
 

@@ -21,7 +21,7 @@ from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import PIXEL_MARGIN, FlatMap, Projection, Workspace
 from dhkit.viewer.diagrams import style_axes
-from dhkit.viewer.figures import LINK_COLOR, plot, set_space_limits, skeleton, space_axes
+from dhkit.viewer.figures import LINK_COLOR, figure_of, set_space_limits, skeleton, space_axes
 from dhkit.viewer.notebook import new_figure
 from dhkit.viewer.scene import first_configuration, scene_size
 
@@ -93,7 +93,7 @@ class _Panel:
         return image
 
 
-@plot.register(Workspace)
+@figure_of.register(Workspace)
 def plot_workspace(workspace: Workspace) -> Figure:
     """Return a figure of an arm's workspace, colored by the best manipulability at each place, with the arm in it.
 
@@ -204,7 +204,7 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     return figure
 
 
-@plot.register(Ellipsoid)
+@figure_of.register(Ellipsoid)
 def _(value: Ellipsoid) -> Figure:
     batch = zip(
         value.center.reshape(-1, 3),
