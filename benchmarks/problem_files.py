@@ -1,6 +1,7 @@
 """Problems that any tool can solve (`python -m benchmarks.problem_files`): benchmarks/problems/NAME.json.
 
-A file has an arm's table, states with their poses, and poses with all joint values that reach them. A state defines a
+A file has an arm's table, states with their poses, poses with all joint values that reach them, states with their
+torques, and motions among obstacles. A state defines a
 pose, whose exact pose has the other solutions: each is found in doubles by two methods, and refined by Newton's
 method with 50 digits until it changes by less than 1e-40. Poses without a solution lie outside by a known length.
 """
@@ -17,6 +18,7 @@ import mpmath as mp
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.motion_problem_files import motions_of
 from dhkit import Arm, __version__
 from dhkit.description import Array, Description, write_atomically
 from dhkit.kinematics.numeric import solve_numerically
@@ -67,10 +69,11 @@ def problems_of(name: str) -> dict[str, Any]:
     arm = Arm.load(name)
     exact = ExactArm(arm.description)
     rng = np.random.default_rng(sum(name.encode()))
+    table = table_of(arm.description)
     return {
         "format": 1,
         "made_by": f"dhkit {__version__}",
-        "arm": table_of(arm.description),
+        "arm": table,
         "forward_kinematics": [
             {"q": q.tolist(), "T": exact.rounded(exact.pose(q))} for q in states(arm, rng, REGULAR)
         ],
@@ -81,6 +84,7 @@ def problems_of(name: str) -> dict[str, Any]:
             *unreachable(arm, rng),
         ],
         "dynamics": dynamics_of(arm, rng),
+        "motions": motions_of(arm, table),
     }
 
 

@@ -328,7 +328,7 @@ def _scene(kind: SceneKind, planner: Planner, scene: Scene, starts: int) -> Scen
             best = min(
                 best,
                 planner.solve(
-                    scene.start, scene.goal, warm=_along(description, path), **options
+                    scene.start, scene.goal, warm=along_path(description, path), **options
                 ).duration,
             )
         except PlanningError:
@@ -349,7 +349,7 @@ def _scene(kind: SceneKind, planner: Planner, scene: Scene, starts: int) -> Scen
     )
 
 
-def _along(description: Description, path: Array) -> Trajectory:
+def along_path(description: Description, path: Array) -> Trajectory:
     """Return a motion along a path, at rest at its ends."""
     steps = np.max(np.abs(np.diff(path, axis=0)) / description.numbers.velocity, axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])

@@ -384,6 +384,22 @@ def test_links_out_of_the_folder_are_not_followed(tmp_path):
     assert [report.verdict for report in refused] == [Verdict.UNREADABLE] * 4
 
 
+def test_a_link_in_a_students_folder_does_not_lead_to_another_students_sheet(tmp_path):
+    for student in ("ann", "bob", "cem"):
+        (tmp_path / student).mkdir()
+    (tmp_path / "ann" / "sheet.toml").write_text("[answer]\n")
+    (tmp_path / "bob" / "sheet.toml").symlink_to("../ann/sheet.toml")
+    (tmp_path / "cem" / "own.toml").write_text("[answer]\n")
+    (tmp_path / "cem" / "sheet.toml").symlink_to("own.toml")
+    errors = {(sheet.student, sheet.path.name): sheet.error for sheet in find_sheets([tmp_path])}
+    assert errors == {
+        ("ann", "sheet.toml"): "",
+        ("bob", "sheet.toml"): "a link out of the folder; it is not followed",
+        ("cem", "own.toml"): "",
+        ("cem", "sheet.toml"): "",
+    }
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
 def test_what_is_no_file_and_what_is_too_deep(tmp_path):
     os.mkfifo(tmp_path / "pipe.toml")

@@ -1,7 +1,7 @@
 """Problems with known answers: which solutions of inverse kinematics each solver finds, misses and invents.
 
-A file has an arm's table as plain numbers, and poses with all joint values that reach them, or none. The files in
-``benchmarks/problems`` are described there; any tool can be scored by them.
+A file has an arm's table as plain numbers, and poses with all joint values that reach them, or none; and perhaps
+motions among obstacles. The files in ``benchmarks/problems`` are described there; any tool can be scored by them.
 """
 
 from __future__ import annotations
@@ -19,6 +19,12 @@ from dhkit.arm import Arm
 from dhkit.bench.benchmark_report import Report, Table, duration
 from dhkit.bench.contenders import Contender, UnavailableError, Workload
 from dhkit.bench.machine import Machine
+from dhkit.bench.motion_problems import (
+    MOTION_COLUMNS,
+    MotionProblems,
+    MotionRow,
+    plan_problems,
+)
 from dhkit.bench.peers import all_contenders
 from dhkit.description import Array
 from dhkit.description.files import read_bounded
@@ -43,7 +49,9 @@ KINDS = (*REACHABLE, "just unreachable", "far unreachable")
 _MEANING = (
     "Found: solutions of the file that the solver gave, up to 1e-6 rad or m. Invented: joint values that miss the pose "
     "by more than 1e-6 m or rad. Error: largest difference of the pose of a found solution, m or rad. Time: of a "
-    "pose, of all poses in one run, the fastest of three; dhkit's kernels are compiled before."
+    "pose, of all poses in one run, the fastest of three; dhkit's kernels are compiled before. Motions are dhkit's: "
+    "found are those that keep the clearance and all limits, by formulas of the benchmark's own, at 1 kHz; durations "
+    "are compared with the shortest known ones."
 )
 
 
@@ -61,12 +69,15 @@ class Problems:
         Poses of the tool in the world, shape (N, 4, 4), m.
     solutions
         Joint values that reach each pose, shape (k, n) each, rad and m; k is 0 for poses out of reach.
+    motions
+        Motions among obstacles; None without any.
     """
 
     arm: Arm
     kinds: tuple[str, ...]
     T: Array
     solutions: tuple[Array, ...]
+    motions: MotionProblems | None = None
 
     @classmethod
     def read(cls, path: Path) -> Problems:
@@ -88,7 +99,8 @@ class Problems:
             solutions = tuple(
                 np.array(pose["solutions"], dtype=float).reshape(-1, arm.n) for pose in poses
             )
-            return cls(arm, tuple(str(pose["kind"]) for pose in poses), T, solutions)
+            motions = MotionProblems.read(data) if "motions" in data else None
+            return cls(arm, tuple(str(pose["kind"]) for pose in poses), T, solutions, motions)
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise DescriptionError(
                 f"{path}: no problems: {type(error).__name__}: {error}"
@@ -184,15 +196,18 @@ class ProblemReport(Report):
         The machine and the versions.
     rows
         A row for each arm and solver.
+    motions
+        A row for each arm with motions.
     """
 
     machine: Machine
     rows: tuple[ProblemRow, ...] = ()
+    motions: tuple[MotionRow, ...] = ()
 
     @property
     def title(self) -> str:
         """The measured subject, in a line."""
-        return "Inverse kinematics: poses whose solutions are known"
+        return "Inverse kinematics and motions whose answers are known"
 
     @property
     def meaning(self) -> str:
@@ -215,6 +230,7 @@ class ProblemReport(Report):
         return [
             ("Solutions", columns, scored),
             ("Took no part", ("arm", "solver", "reason"), others),
+            ("Motions", MOTION_COLUMNS, [row.cells for row in self.motions]),
         ]
 
     @property
@@ -265,6 +281,7 @@ def run_problems(
         if one.quantity == "ik" and (not one.own or one.name in _OWN)
     ]
     rows = []
+    motions = []
     for file in files:
         problems = Problems.read(file)
         problems.arm.compile()
@@ -272,7 +289,11 @@ def run_problems(
             if progress is not None:
                 progress(f"{problems.arm.name}: {contender.name}")
             rows.append(_score(problems, contender))
-    return ProblemReport(Machine.here(), tuple(rows))
+        if problems.motions is not None:
+            if progress is not None:
+                progress(f"{problems.arm.name}: motions")
+            motions.append(plan_problems(problems.motions))
+    return ProblemReport(Machine.here(), tuple(rows), tuple(motions))
 
 
 @dataclass(frozen=True, eq=False)

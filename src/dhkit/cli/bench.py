@@ -58,7 +58,7 @@ def bench(
     problems: Annotated[
         Path | None,
         typer.Option(
-            help="Score inverse kinematics on these problems instead: a folder or a file (.json)."
+            help="Score inverse kinematics and motions on these problems instead: a folder or a file (.json)."
         ),
     ] = None,
     json: Json = False,
@@ -127,7 +127,7 @@ def run(
 
 
 def run_on_problems(path: Path, output: Path | None, *, json: bool) -> ExitStatus:
-    """Score every solver on problems, and print the report; the status is NO if dhkit misses or invents a solution."""
+    """Score every solver on problems, and print the report; the status is NO if dhkit misses or invents an answer."""
     files = files_in(path)
     _check_places(output)
     progress = _Progress()
@@ -135,6 +135,7 @@ def run_on_problems(path: Path, output: Path | None, *, json: bool) -> ExitStatu
     progress.clear()
     _deliver(report, output, json=json)
     are_right = all(row.is_right for row in report.rows if row.own)
+    are_right = are_right and all(row.is_right for row in report.motions)
     return ExitStatus.FINE if are_right else ExitStatus.NO
 
 

@@ -237,7 +237,9 @@ def visit(root: Path, suffixes: Collection[str]) -> Iterator[Sheet]:
         parts = path.relative_to(root).parts
         stem, suffix = split_name(path.name, suffixes)
         student = stem if len(parts) == 1 else parts[0]
-        if path.is_symlink() and (fault := _fault_of_link(path, inside, suffixes)):
+        # A link in a student's folder must not lead to another student's sheet.
+        own = inside if len(parts) == 1 else inside / parts[0]
+        if path.is_symlink() and (fault := _fault_of_link(path, own, suffixes)):
             yield Sheet(path, student, fault)
         elif path.is_dir():
             if fault := _fault_of_folder(path, len(parts)):
@@ -269,7 +271,7 @@ def _walk(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def _fault_of_link(path: Path, inside: Path, suffixes: Collection[str]) -> str:
-    """Return the error of a link; empty if its target is inside the folder, or would not be a sheet."""
+    """Return the error of a link; empty if its target is inside a folder, or would not be a sheet."""
     is_sheet = split_name(path.name, suffixes)[1] in suffixes
     try:
         target = path.resolve(strict=True)
