@@ -1,0 +1,256 @@
+"""Steps of programs for one pose that all ways of elimination share: from values to the roots of the polynomial."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Sequence
+from functools import reduce
+from itertools import accumulate
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+from dhkit.kinematics.polynomial.extension import Extension
+from dhkit.kinematics.polynomial.roots_program import (
+    BEYOND,
+    CONVERGED,
+    ERROR_OF_VALUE,
+    FIRST_ANGLE,
+    FIRST_RADII,
+    MOST_STEPS,
+    NEAR_ROOTS,
+    aberth_step,
+    are_near,
+    coefficients,
+    complex_of,
+    nearly_real,
+    polynomial_of,
+    sizes_of,
+)
+from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE
+from dhkit.kinematics.polynomial.trigonometric import (
+    DEGREE,
+    DOUBTFUL,
+    NONE,
+    ROOTS,
+    SAMPLES,
+    SOLUTION,
+)
+from dhkit.kinematics.solutions import LIMIT_SLACK
+from dhkit.symbolic import Graph, PipelineStep
+
+_SX: TypeAlias = Any
+"""A CasADi SX scalar or matrix."""
+RESULTS = ("q", "summary", "details", "posed", "error")
+"""Outputs of a pose's program.
+
+- ``q``, 16 times 6, rad;
+- ``summary``, 16 times 3: what is known of the root (``NONE``, ``SOLUTION`` or ``DOUBTFUL``), the number by which
+  solutions are sorted, and whether a joint is outside its limits;
+- ``details`` of the root, 16 times 4 or more: whether it is nearly real, real, and so near to another that its solution
+  may be singular; the error of its joint values; and more by the way of elimination;
+- ``posed``, whether T is a pose;
+- ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
+"""
+_COEFFICIENTS = 2 * DEGREE + 1
+_TOGETHER = 8
+"""Numbers whose reciprocals are computed together."""
+
+
+def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
+    """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
+
+    Their outputs are ``error``, and of each root ``angle``, rad, ``is_tried``, ``is_real`` and ``is_double``.
+
+    Parameters
+    ----------
+    parameters
+        Symbols of the pipeline's parameters.
+    """
+    return (
+        _known_coefficients(parameters),
+        _first_estimates(parameters),
+        _better_estimates(parameters),
+        _angles(parameters),
+    )
+
+
+def _known_coefficients(parameters: _SX) -> PipelineStep:
+    """Return the step from values to coefficients, and the largest one beyond the degree."""
+    values = ca.SX.sym("values", SAMPLES)
+    numbers, error = coefficients(values, DEGREE)
+    sizes = ca.vertcat(*sizes_of(polynomial_of(numbers, DEGREE)))
+    inputs = {"parameters": parameters, "values": values}
+    outputs = {"numbers": numbers, "sizes": sizes, "error": error}
+    graph = Graph.of("coefficients", inputs, outputs)
+    return PipelineStep(graph, shared={"values": "value"})
+
+
+def _first_estimates(parameters: _SX) -> PipelineStep:
+    """Return the step with the first estimates of the roots, beside the unit circle inside and outside in turn."""
+    index = ca.SX.sym("index")
+    is_odd = index - 2.0 * ca.floor(index / 2.0) > 0.5
+    radius = ca.if_else(is_odd, FIRST_RADII[1], FIRST_RADII[0])
+    angle = FIRST_ANGLE + index * (math.tau / ROOTS)
+    inputs = {"parameters": parameters, "index": index}
+    outputs = {"x": radius * ca.cos(angle), "y": radius * ca.sin(angle)}
+    graph = Graph.of("first_estimates", inputs, outputs)
+    return PipelineStep(graph, ROOTS, each={"index": "index"})
+
+
+def _better_estimates(parameters: _SX) -> PipelineStep:
+    """Return Aberth's step for each root, which is repeated until none moves."""
+    numbers = ca.SX.sym("numbers", _COEFFICIENTS)
+    index, root, others = _root_and_others()
+    sizes = ca.SX.sym("sizes", _COEFFICIENTS)
+    apart = [root - other for other in others]
+    squares = []
+    for j, z in enumerate(apart):
+        is_other = index != float(j)
+        squares.append(ca.if_else(is_other, z.x * z.x + z.y * z.y, 1.0))
+    # 1 / z = (x - i y) / (x^2 + y^2), and 0 of the root itself, whose x and y are 0.
+    repulsion = complex_of(ca.SX(0.0), ca.SX(0.0))
+    for z, over in zip(apart, _reciprocals(squares), strict=True):
+        repulsion = repulsion + complex_of(z.x * over, -z.y * over)
+    polynomial = polynomial_of(numbers, DEGREE)
+    moved, step = aberth_step(polynomial, ca.vertsplit(sizes), root, repulsion)
+    inputs = {
+        "parameters": parameters,
+        "numbers": numbers,
+        "sizes": sizes,
+        **_inputs_of(index, root, others),
+    }
+    outputs = {"x": moved.x, "y": moved.y, "goes_on": ca.if_else(step >= CONVERGED, 1.0, 0.0)}
+    return PipelineStep(
+        Graph.of("better_estimates", inputs, outputs),
+        ROOTS,
+        each={"index": "index"},
+        shared={"numbers": "numbers", "sizes": "sizes", "xs": "x", "ys": "y"},
+        most=MOST_STEPS,
+    )
+
+
+def _angles(parameters: _SX) -> PipelineStep:
+    """Return the step that tells which roots are real, and their angles of joint 1."""
+    numbers = ca.SX.sym("numbers", _COEFFICIENTS)
+    error = ca.SX.sym("error")
+    first = ca.SX.sym("first")
+    index, root, others = _root_and_others()
+    tolerance = ca.fmax(ERROR_OF_VALUE, error)
+    angle, height, is_real = nearly_real(polynomial_of(numbers, DEGREE), root, tolerance)
+    is_double = ca.SX(0.0) > 0.0
+    for j, other in enumerate(others):
+        is_other = ca.logic_and(index != float(j), are_near(root, other))
+        is_double = ca.logic_or(is_double, is_other)
+    is_double = ca.logic_and(is_double, height < NEAR_ROOTS)
+
+    is_tried = angle < BEYOND
+    inputs = {
+        "parameters": parameters,
+        "numbers": numbers,
+        "error": error,
+        "first": first,
+        **_inputs_of(index, root, others),
+    }
+    outputs = {
+        "angle": ca.if_else(is_tried, angle, 0.0) + first,
+        "is_tried": ca.if_else(is_tried, 1.0, 0.0),
+        "is_real": is_real,
+        "is_double": ca.if_else(is_double, 1.0, 0.0),
+    }
+    return PipelineStep(
+        Graph.of("angles", inputs, outputs),
+        ROOTS,
+        each={"index": "index"},
+        shared={"numbers": "numbers", "error": "error", "first": "first", "xs": "x", "ys": "y"},
+    )
+
+
+def known_solutions(
+    parameters: _SX,
+    inputs: dict[str, _SX],
+    of_root: Sequence[_SX],
+    q: _SX,
+    error: _SX,
+    is_delicate: _SX,
+    more: Sequence[_SX] = (),
+) -> Graph:
+    """Return the program of the last step: joint values at roots, and what is known of them.
+
+    Parameters
+    ----------
+    parameters
+        Symbols of the parameters; the last twelve are lower and upper limits.
+    inputs
+        Inputs of the step, besides ``is_tried`` and ``is_real``.
+    of_root
+        Symbols of ``is_tried`` and ``is_real``.
+    q, error
+        Joint values, 6 x 1, rad, and their error.
+    is_delicate
+        Whether the solution may be singular.
+    more
+        Further details, of which none is above 0 at a root that has just one solution.
+    """
+    is_tried, is_real = of_root
+    has_more = sum((ca.if_else(x > 0.0, 1.0, 0.0) for x in more), ca.SX(0.0)) > 0.0
+    is_alone = ca.logic_not(ca.logic_or(is_delicate, has_more))
+    is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
+    kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, SOLUTION, DOUBTFUL), NONE)
+    q_1, q_2, q_3 = (ca.floor(q[k] / SAME_ANGLE + 0.5) * SAME_ANGLE for k in range(3))
+    order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
+
+    # lower <= q + 2 pi k <= upper for some whole k.
+    lower = parameters[-12:-6] - LIMIT_SLACK
+    upper = parameters[-6:] + LIMIT_SLACK
+    windings = ca.floor((upper - q) / math.tau) + ca.floor((q - lower) / math.tau)
+    is_outside = reduce(ca.fmin, ca.vertsplit(windings)) < 0.0
+
+    def at_tried(x: _SX) -> _SX:
+        """Return 0 where the root is complex: what follows from it is without meaning."""
+        return ca.if_else(is_tried != 0.0, x, 0.0)
+
+    details = [is_tried, is_real, ca.if_else(is_delicate, 1.0, 0.0), *map(at_tried, (error, *more))]
+    outputs = {
+        "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
+        "summary": ca.vertcat(kind, at_tried(order), at_tried(is_outside)),
+        "details": ca.vertcat(*details),
+    }
+    return Graph.of("solutions", inputs, outputs)
+
+
+def _reciprocals(numbers: list[_SX]) -> list[_SX]:
+    """Return 1 / x of positive numbers, with one division for each eight, for it takes as long as some 16 products."""
+    reciprocals: list[_SX] = []
+    for begin in range(0, len(numbers), _TOGETHER):
+        part = numbers[begin : begin + _TOGETHER]
+        # before[k] is the product of those before k, and after that of those behind k over that of all.
+        before = list(accumulate(part, operator.mul, initial=ca.SX(1.0)))
+        after = 1.0 / before[-1]
+        found = []
+        for k in reversed(range(len(part))):
+            found.append(before[k] * after)
+            after = after * part[k]
+        reciprocals += reversed(found)
+    return reciprocals
+
+
+def _root_and_others() -> tuple[_SX, Extension, list[Extension]]:
+    """Return symbols of a root's number, of the root, and of all roots."""
+    index = ca.SX.sym("index")
+    root = complex_of(ca.SX.sym("x"), ca.SX.sym("y"))
+    xs = ca.vertsplit(ca.SX.sym("xs", ROOTS))
+    ys = ca.vertsplit(ca.SX.sym("ys", ROOTS))
+    return index, root, [complex_of(x, y) for x, y in zip(xs, ys, strict=True)]
+
+
+def _inputs_of(index: _SX, root: Extension, others: list[Extension]) -> dict[str, _SX]:
+    """Return the symbols of :func:`_root_and_others` as inputs of a step."""
+    return {
+        "index": index,
+        "x": root.x,
+        "y": root.y,
+        "xs": ca.vertcat(*(other.x for other in others)),
+        "ys": ca.vertcat(*(other.y for other in others)),
+    }
