@@ -122,6 +122,10 @@ class Kernel:
         edges = [count * k // shares for k in range(shares + 1)]
         all_in_threads(work, [slice(begin, end) for begin, end in pairwise(edges)])
 
+    def is_compiled_for(self, count: int) -> bool:
+        """Return whether a batch would be computed by machine code; counts and compiles as a call does."""
+        return self._function_for(count) is not None
+
     def compile(self) -> None:
         """Load machine code from the cache or compile it now, unless ``DHKIT_KERNELS`` is ``off``."""
         if kernel_mode() == "off":

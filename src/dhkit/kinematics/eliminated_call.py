@@ -14,16 +14,14 @@ from dhkit.kernels import FastCall, SingleCall, never
 from dhkit.kernels.background import Background
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.eliminated import branch_names, elimination_kernels, has_curves
+from dhkit.kinematics.polynomial.pose_results import PoseProgram
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import INEXACT
 from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, ROOTS, SOLUTION
-from dhkit.kinematics.polynomial.two_parallel import DETAILS, TwoParallel
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
 log = logging.getLogger(__name__)
 
-_PACKED = struct.Struct(f"{3 * ROOTS}d{8 * DETAILS * ROOTS}xdd")
-"""What is known of the roots, whether T is a pose, and the error of its polynomial; details are left out."""
 _NO_DISTANCE = bytes(8)
 _STATUS = bytes([IKStatus.ok])
 _INSIDE = 0
@@ -31,15 +29,17 @@ _OUTSIDE = int(IKFlag.out_of_limits)
 
 
 class EliminatedPoseCall:
-    """All solutions of one pose of an arm with parallel axes 2 and 3, or None of what it does not take.
+    """All solutions of one pose of an arm of six revolute joints by elimination, or None of what it does not take.
 
     It does not take poses without solutions, nor those of which two solutions nearly coincide or one does not close.
     """
 
-    def __init__(self, description: Description, arm: TwoParallel) -> None:
+    def __init__(self, description: Description, arm: PoseProgram) -> None:
         numbers = description.numbers
         middle = np.arange(1.0, description.n + 1.0) / description.n
         self._description = description
+        # What is known of the roots, whether T is a pose, and the error of its polynomial; details are left out.
+        self._packed = struct.Struct(f"{3 * ROOTS}d{8 * arm.details * ROOTS}xdd")
         self._shared: dict[int, dict[str, object]] = {}
         self._call: FastCall = SingleCall(
             arm.pose_kernel,
@@ -75,7 +75,7 @@ class EliminatedPoseCall:
         if found is None:
             return None
         q, packed = found
-        *roots, posed, error = _PACKED.unpack(packed)
+        *roots, posed, error = self._packed.unpack(packed)
         kinds = roots[::3]
         # False for NaN.
         is_known = posed == 1.0 and error < INEXACT
@@ -147,7 +147,6 @@ def elimination_call(
     install
         Called with the function that takes the place of this one.
     """
-    arm = six_joints(description).two_parallel
-    if arm is None or has_curves(description):
+    if has_curves(description):
         return EliminationCall(description, install)
-    return EliminatedPoseCall(description, arm)
+    return EliminatedPoseCall(description, six_joints(description).elimination)

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +25,21 @@ from numpy.typing import NDArray
 from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description
 from dhkit.description.poses import inverse_pose
-from dhkit.kernels import Kernel
+from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import tool_kernel
 from dhkit.kinematics.newton import Newton, error_kernel, magnitude
+from dhkit.kinematics.polynomial.pose_results import (
+    COMMON_DETAILS,
+    PoseResults,
+    output_sizes,
+    with_rows,
+)
 from dhkit.kinematics.polynomial.solve import Candidates
 from dhkit.kinematics.polynomial.trigonometric import angles, real_roots, roots_kernel
+
+if TYPE_CHECKING:
+    from dhkit.symbolic import Pipeline
 
 Complex: TypeAlias = "NDArray[np.complex128]"
 Coefficients: TypeAlias = "tuple[Array, Array, Array]"
@@ -53,8 +62,12 @@ _MIXED = 0.7 + 0.3j
 """Factor t of t x + y, by which two solutions differ even if they share x or y."""
 _OF_TWO_POWERS: Complex = np.kron(_AS_POWERS, _AS_POWERS)
 _EACH = slice(None)
+_NEAR = 1e-6
+"""Error of joint values, share of the reach and rad, above which a root is solved once more."""
 _FIRST_ANGLE = 0.1
 """First angle at which polynomials are evaluated, rad."""
+_WORK = 4
+"""A pose counts as so many items towards compiling its program, which takes about 3 s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +83,56 @@ class _FarSide:
     """Orthonormal columns, shape (N, 14, 8)."""
     R: Array
     """Triangular, shape (N, 8, 8)."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledGeneral:
+    """An elimination as a program for one pose; by LAPACK until it is compiled, and where roots nearly coincide."""
+
+    lapack: General
+
+    @cached_property
+    def parameters(self) -> Array:
+        """See :func:`dhkit.kinematics.polynomial.general_pose.pose_program`."""
+        arm = self.lapack
+        numbers = (arm.T_tool_world[:3], arm.directions, arm.points, *arm.near_side)
+        return np.concatenate([[1.0 / arm.newton.length], *map(np.ravel, numbers)])
+
+    @property
+    def details(self) -> int:
+        """Number of details of a root."""
+        return COMMON_DETAILS
+
+    @property
+    def pose_kernel(self) -> Kernel:
+        """The kernel of :func:`dhkit.kinematics.polynomial.general_pose.pose_program`."""
+        arm = self.lapack
+
+        def derived() -> Pipeline:
+            from dhkit.kinematics.polynomial.general_pose import pose_program
+
+            return pose_program(arm.joint, arm.is_reversed)
+
+        types = ("float64",) * len(output_sizes(self.details))
+        return kernel("general_pose", f"{arm.joint} {arm.is_reversed}", derived, types)
+
+    @property
+    def kernels(self) -> Sequence[Kernel]:
+        """The kernels of both ways."""
+        return [self.pose_kernel, *self.lapack.kernels]
+
+    def candidates(self, poses: Array) -> Candidates:
+        """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
+        if not self.pose_kernel.is_compiled_for(_WORK * len(poses)):
+            return self.lapack.candidates(poses)
+        results = PoseResults.of(self, poses)
+        found = results.candidates()
+        # Two solutions may share a root, or the elimination may fail.
+        is_doubtful = results.is_delicate | (results.is_near & ~(results.error < _NEAR))
+        rows = np.flatnonzero(is_doubtful.any(axis=1) | ~np.isfinite(found.error_of_polynomial))
+        if not len(rows):
+            return found
+        return with_rows(found, rows, self.lapack.candidates(poses[rows]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +211,7 @@ class General:
         third = np.angle((null[:, :, 1:] * null[:, :, :-1].conj()).sum(axis=(1, 2)))
 
         # The equations, eight of which were to eliminate the other joints, now give the products of those.
-        constant, cosine, sine = self._near_side
+        constant, cosine, sine = self.near_side
         factors = (
             constant + np.cos(kept)[:, None, None] * cosine + np.sin(kept)[:, None, None] * sine
         )
@@ -205,7 +268,7 @@ class General:
         return complex(np.conj(value) / abs(value)) if value else 1.0
 
     @cached_property
-    def _near_side(self) -> Coefficients:
+    def near_side(self) -> Coefficients:
         """The equations' side of joint i, in products of the two joints after it, shape (14, 9) each.
 
         Its origin is on axis i, about which R = n n^T + cos q (1 - n n^T) + sin q [n] turns all vectors.
@@ -232,7 +295,7 @@ class General:
         other = self._far_side(motions)
         Q, R = np.linalg.qr(other[:, :, 1:], mode="complete")
         null = np.swapaxes(Q[:, :, _PRODUCTS:], 1, 2)
-        constant, cosine, sine = (null @ side for side in self._near_side)
+        constant, cosine, sine = (null @ side for side in self.near_side)
         constant[:, :, 0] -= np.einsum("nij,nj->ni", null, other[:, :, 0])
         six = (constant @ _OF_TWO_POWERS, cosine @ _OF_TWO_POWERS, sine @ _OF_TWO_POWERS)
         return _FarSide(six, other[:, :, 0], Q[:, :, :_PRODUCTS], R[:, :_PRODUCTS])

@@ -15,7 +15,7 @@ from dhkit.description import Array, Description
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.numeric import refined, solve_numerically
-from dhkit.kinematics.polynomial.general import General
+from dhkit.kinematics.polynomial.general import CompiledGeneral, General
 from dhkit.kinematics.polynomial.solve import MOST, Elimination, Found, distinct, solve
 from dhkit.kinematics.polynomial.two_parallel import TwoParallel
 
@@ -46,7 +46,7 @@ class SixJoints:
         return TwoParallel.fit(Axes.of(self.description))
 
     @cached_property
-    def elimination(self) -> Elimination:
+    def elimination(self) -> TwoParallel | CompiledGeneral:
         """The way in which joints are eliminated.
 
         Of those for any geometry it is the one that finds most poses of random joint values, and most of them in full.
@@ -57,7 +57,7 @@ class SixJoints:
         poses = forward_kinematics(self.description, q).reshape(-1, 16)
         variants = General.of(self.description).variants()
         failures = [self._failures(variant, q, poses) for variant in variants]
-        return variants[int(np.argmin(failures))]
+        return CompiledGeneral(variants[int(np.argmin(failures))])
 
     def _failures(self, elimination: Elimination, q: Array, poses: Array) -> int:
         """Return how badly an elimination fails at poses that were made of joint values (N, 6)."""

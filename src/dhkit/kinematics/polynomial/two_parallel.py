@@ -28,16 +28,16 @@ from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.polynomial.extension import SIGNS
+from dhkit.kinematics.polynomial.pose_results import (
+    COMMON_DETAILS,
+    PoseResults,
+    output_sizes,
+    with_more,
+)
 from dhkit.kinematics.polynomial.solve import Candidates
-from dhkit.kinematics.polynomial.trigonometric import ROOTS, expected_roots
 
 if TYPE_CHECKING:
     from dhkit.symbolic import Graph, Pipeline
-
-DETAILS = 3 + 1 + len(SIGNS)
-"""Number of details of a root."""
-SIZES = (6 * ROOTS, 3 * ROOTS, DETAILS * ROOTS, 1, 1)
-"""Numbers of entries of the outputs of a pose's program."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +93,11 @@ class TwoParallel:
         )
 
     @property
+    def details(self) -> int:
+        """Number of details of a root: which combinations of signs fit, besides those of all programs."""
+        return COMMON_DETAILS + len(SIGNS)
+
+    @property
     def kernels(self) -> Sequence[Kernel]:
         """The kernels of the programs."""
         return [self.pose_kernel, self._joints_kernel]
@@ -106,7 +111,7 @@ class TwoParallel:
 
             return pose_program(self.meeting)
 
-        types = ("float64",) * len(SIZES)
+        types = ("float64",) * len(output_sizes(self.details))
         return kernel("two_parallel_pose", f"{self.meeting}", derived, types, is_loop=True)
 
     @property
@@ -120,39 +125,17 @@ class TwoParallel:
 
     def candidates(self, poses: Array) -> Candidates:
         """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
-        # Limits do not matter here.
-        parameters = np.concatenate([self.parameters, np.full(6, -np.inf), np.full(6, np.inf)])
-        results = [np.empty((len(poses), size)) for size in SIZES]
-        self.pose_kernel(parameters, [poses], results)
-        joints_of_pose, _, details_of_pose, _, error_of_polynomial = results
-        joints = joints_of_pose.reshape(-1, ROOTS, 6)
-        details = details_of_pose.reshape(-1, ROOTS, DETAILS)
-        is_near, is_real, is_delicate = np.moveaxis(details[:, :, :3] > 0.0, -1, 0)
-        owner, place = np.nonzero(is_near)
-        root = np.arange(len(owner))
-        q = joints[owner, place]
-        error = details[owner, place, 3]
-        also = details[owner, place, 4:]
-        if (also > 0.0).any():
-            # Roots that serve several combinations of signs have several solutions.
-            rows, choice = np.nonzero(also > 0.0)
-            more, errors = self._with_signs(
-                poses[owner[rows]], q[rows, :1], np.array(SIGNS)[choice]
-            )
-            root = np.concatenate([root, rows])
-            order = np.argsort(root, kind="stable")
-            root = root[order]
-            q = np.concatenate([q, more])[order]
-            error = np.concatenate([error, errors])[order]
-        return Candidates(
-            q,
-            error,
-            owner[root],
-            root,
-            expected_roots(is_near, is_real, error_of_polynomial),
-            is_delicate.any(axis=1),
-            error_of_polynomial[:, 0],
+        results = PoseResults.of(self, poses)
+        found = results.candidates()
+        also = results.more[results.is_near]
+        if not (also > 0.0).any():
+            return found
+        # Roots that serve several combinations of signs have several solutions.
+        root, choice = np.nonzero(also > 0.0)
+        more, errors = self._with_signs(
+            poses[found.owner[root]], found.q[root, :1], np.array(SIGNS)[choice]
         )
+        return with_more(found, more, errors, root)
 
     def _with_signs(self, poses: Array, q_1: Array, signs: Array) -> tuple[Array, Array]:
         """Return joint values (K, 6), rad, and errors (K,) of poses (K, 16) near roots (K, 1) with signs (K, 2)."""

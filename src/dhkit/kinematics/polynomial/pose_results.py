@@ -1,0 +1,132 @@
+"""What a program for one pose finds, for batches; see :mod:`dhkit.kinematics.polynomial.pose_steps`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array
+from dhkit.kernels import Kernel
+from dhkit.kinematics.polynomial.solve import Candidates
+from dhkit.kinematics.polynomial.trigonometric import ROOTS, expected_roots
+
+COMMON_DETAILS = 4
+"""Number of details of a root that all programs give."""
+
+
+class PoseProgram(Protocol):
+    """An elimination as a program for one pose."""
+
+    @property
+    def pose_kernel(self) -> Kernel:
+        """The program, whose outputs have the sizes of :func:`output_sizes`."""
+
+    @property
+    def parameters(self) -> Array:
+        """Its parameters but for the limits, which follow."""
+
+    @property
+    def details(self) -> int:
+        """Number of details of a root."""
+
+
+def output_sizes(details: int) -> tuple[int, ...]:
+    """Return the numbers of entries of a program's outputs, with a number of details of a root."""
+    return (6 * ROOTS, 3 * ROOTS, details * ROOTS, 1, 1)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseResults:
+    """Roots of N poses."""
+
+    q: Array
+    """Joint values at the roots, shape (N, 16, 6), rad."""
+    is_near: NDArray[np.bool_]
+    is_real: NDArray[np.bool_]
+    is_delicate: NDArray[np.bool_]
+    """Whether a root is nearly real, real, and may belong to a singular solution, shape (N, 16) each."""
+    error: Array
+    """Of the joint values, shape (N, 16), shares of the reach and rad."""
+    more: Array
+    """Further details, shape (N, 16, K)."""
+    error_of_polynomial: Array
+    """Shape (N, 1)."""
+
+    @classmethod
+    def of(cls, program: PoseProgram, poses: Array) -> PoseResults:
+        """Return the results of poses, shape (N, 16), m; limits do not matter."""
+        parameters = np.concatenate([program.parameters, np.full(6, -np.inf), np.full(6, np.inf)])
+        outputs = [np.empty((len(poses), size)) for size in output_sizes(program.details)]
+        program.pose_kernel(parameters, [poses], outputs)
+        q, _, of_roots, _, error_of_polynomial = outputs
+        details = of_roots.reshape(len(poses), ROOTS, program.details)
+        is_near, is_real, is_delicate = np.moveaxis(details[:, :, :3] > 0.0, -1, 0)
+        return cls(
+            q.reshape(len(poses), ROOTS, 6),
+            is_near,
+            is_real,
+            is_delicate,
+            details[:, :, 3],
+            details[:, :, COMMON_DETAILS:],
+            error_of_polynomial,
+        )
+
+    def candidates(self) -> Candidates:
+        """Return the joint values at roots that are nearly real."""
+        owner, place = np.nonzero(self.is_near)
+        return Candidates(
+            self.q[owner, place],
+            self.error[owner, place],
+            owner,
+            np.arange(len(owner)),
+            expected_roots(self.is_near, self.is_real, self.error_of_polynomial),
+            np.asarray(self.is_delicate.any(axis=1)),
+            self.error_of_polynomial[:, 0],
+        )
+
+
+def with_more(found: Candidates, q: Array, error: Array, root: NDArray[np.intp]) -> Candidates:
+    """Return candidates with others (K, 6), rad, at roots (K,) that have several solutions."""
+    roots = np.concatenate([found.root, root])
+    order = np.argsort(roots, kind="stable")
+    return Candidates(
+        np.concatenate([found.q, q])[order],
+        np.concatenate([found.error, error])[order],
+        found.owner[roots[order]],
+        roots[order],
+        found.expected,
+        found.is_delicate,
+        found.error_of_polynomial,
+    )
+
+
+def with_rows(found: Candidates, rows: NDArray[np.intp], others: Candidates) -> Candidates:
+    """Return candidates of which those of poses ``rows`` (M,) are replaced by the candidates of M poses."""
+    is_replaced = np.zeros(len(found.expected), dtype=bool)
+    is_replaced[rows] = True
+    kept = ~is_replaced[found.owner]
+    # Roots are told apart by numbers.
+    first = 1 + int(found.root.max(initial=0))
+    owner = np.concatenate([found.owner[kept], rows[others.owner]])
+    order = np.argsort(owner, kind="stable")
+
+    def joined(own: NDArray[Any], of_others: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([own[kept], of_others])[order]
+
+    def changed(own: NDArray[Any], of_others: NDArray[Any]) -> NDArray[Any]:
+        values = own.copy()
+        values[rows] = of_others
+        return values
+
+    return Candidates(
+        joined(found.q, others.q),
+        joined(found.error, others.error),
+        owner[order],
+        joined(found.root, first + others.root),
+        changed(found.expected, others.expected),
+        changed(found.is_delicate, others.is_delicate),
+        changed(found.error_of_polynomial, others.error_of_polynomial),
+    )
