@@ -371,8 +371,8 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
     constant = ca.SX.sym("constant", EQUATIONS)
     R = ca.SX.sym("R", FAR * (FAR + 1) // 2)
     angle = ca.SX.sym("angle")
-    of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "is_double")]
-    is_tried, is_real, is_double = of_root
+    of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "closeness")]
+    is_tried, is_real, closeness = of_root
 
     cosine = ca.cos(angle)
     sine = ca.sin(angle)
@@ -393,7 +393,7 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
         "angle": angle,
         **{symbol.name(): symbol for symbol in of_root},
     }
-    graph = known_solutions(parameters, inputs, (is_tried, is_real), q, error, is_double != 0.0)
+    graph = known_solutions(parameters, inputs, (is_tried, is_real), q, error, closeness > 0.0)
     shared = ("goal", "motion", "six", "reflections", "constant", "R")
     return PipelineStep(graph, ROOTS, shared={name: name for name in shared})
 

@@ -20,13 +20,14 @@ from dhkit.kinematics.polynomial.roots_program import (
     FIRST_RADII,
     MOST_STEPS,
     NEAR_ROOTS,
+    NEAREST_ROOTS,
     aberth_step,
-    are_near,
     coefficients,
     complex_of,
     nearly_real,
     polynomial_of,
     sizes_of,
+    square_of_distance,
 )
 from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE
 from dhkit.kinematics.polynomial.trigonometric import (
@@ -53,6 +54,10 @@ RESULTS = ("q", "summary", "details", "posed", "error")
 - ``posed``, whether T is a pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
+BESIDE = 1.0
+COINCIDES = 2.0
+"""Another root is nearer than NEAR_ROOTS, so that the solution may be singular; or than NEAREST_ROOTS, so that both may
+be found as one."""
 _COEFFICIENTS = 2 * DEGREE + 1
 _TOGETHER = 8
 """Numbers whose reciprocals are computed together."""
@@ -61,7 +66,8 @@ _TOGETHER = 8
 def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
 
-    Their outputs are ``error``, and of each root ``angle``, rad, ``is_tried``, ``is_real`` and ``is_double``.
+    Their outputs are ``error``, and of each root ``angle``, rad, ``is_tried``, ``is_real`` and
+    ``closeness``: 0, ``BESIDE`` or ``COINCIDES`` where another root is near.
 
     Parameters
     ----------
@@ -139,11 +145,16 @@ def _angles(parameters: _SX) -> PipelineStep:
     index, root, others = _root_and_others()
     tolerance = ca.fmax(ERROR_OF_VALUE, error)
     angle, height, is_real = nearly_real(polynomial_of(numbers, DEGREE), root, tolerance)
-    is_double = ca.SX(0.0) > 0.0
+    nearest = ca.SX(math.inf)
     for j, other in enumerate(others):
-        is_other = ca.logic_and(index != float(j), are_near(root, other))
-        is_double = ca.logic_or(is_double, is_other)
-    is_double = ca.logic_and(is_double, height < NEAR_ROOTS)
+        nearest = ca.fmin(
+            nearest, ca.if_else(index != float(j), square_of_distance(root, other), math.inf)
+        )
+    # A root that far from the real axis has no solution.
+    nearest = ca.fmax(nearest, height * height)
+    closeness = ca.if_else(
+        nearest < NEAREST_ROOTS**2, COINCIDES, ca.if_else(nearest < NEAR_ROOTS**2, BESIDE, 0.0)
+    )
 
     is_tried = angle < BEYOND
     inputs = {
@@ -157,7 +168,7 @@ def _angles(parameters: _SX) -> PipelineStep:
         "angle": ca.if_else(is_tried, angle, 0.0) + first,
         "is_tried": ca.if_else(is_tried, 1.0, 0.0),
         "is_real": is_real,
-        "is_double": ca.if_else(is_double, 1.0, 0.0),
+        "closeness": closeness,
     }
     return PipelineStep(
         Graph.of("angles", inputs, outputs),

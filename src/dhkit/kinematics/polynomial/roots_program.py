@@ -21,7 +21,7 @@ BEYOND = 4.0
 _IMAGINARY_UNIT = Root(-1.0)
 MOST_STEPS = 60
 """Largest number of Aberth's steps; most polynomials take 7 to 12."""
-CONVERGED = 1e-6
+CONVERGED = 1e-7
 """Estimates whose last steps are below this share of their absolute value are roots: steps shrink by their cubes."""
 FIRST_RADII = (0.95, 1.05)
 FIRST_ANGLE = 0.4
@@ -38,6 +38,8 @@ _MARGIN = 1e4
 """Factor of that error, for roots that are tried."""
 NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
+NEAREST_ROOTS = 1e-4
+"""Distance of two roots, rad, below which Newton's method may find one solution from both."""
 
 
 def roots_program(degree: int, samples: int) -> Loop:
@@ -189,7 +191,7 @@ def _real_roots(polynomial: list[Extension], roots: _Roots, error: SX) -> dict[s
     is_delicate = ca.SX(0.0) > 0.0
     for i, root in enumerate(roots.z):
         for j in range(i):
-            is_near = are_near(root, roots.z[j])
+            is_near = square_of_distance(root, roots.z[j]) < NEAR_ROOTS**2
             is_delicate = ca.logic_or(is_delicate, ca.logic_and(is_near, heights[i] < NEAR_ROOTS))
     return {
         "angle": ca.vertcat(*near),
@@ -225,11 +227,11 @@ def nearly_real(polynomial: list[Extension], root: Extension, tolerance: SX) -> 
     return angle, height, ca.if_else(value < tolerance, 1.0, 0.0)
 
 
-def are_near(root: Extension, other: Extension) -> SX:
-    """Return whether two roots nearly coincide."""
+def square_of_distance(root: Extension, other: Extension) -> SX:
+    """Return the square of the distance of two roots near the unit circle, rad."""
     # e^(i x) - e^(i y) is as long as x - y, through pi too, and heights count like angles.
     apart = root - other
-    return apart.x * apart.x + apart.y * apart.y < NEAR_ROOTS**2
+    return apart.x * apart.x + apart.y * apart.y
 
 
 def complex_of(x: SX, y: SX) -> Extension:

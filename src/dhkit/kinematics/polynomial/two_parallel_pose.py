@@ -13,7 +13,13 @@ import casadi as ca
 
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import orthonormal_goal
-from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, root_steps
+from dhkit.kinematics.polynomial.pose_steps import (
+    COINCIDES,
+    BESIDE,
+    RESULTS,
+    known_solutions,
+    root_steps,
+)
 from dhkit.kinematics.polynomial.trigonometric import ROOTS, SAMPLES
 from dhkit.kinematics.polynomial.two_parallel_program import (
     COUNT,
@@ -91,11 +97,12 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
     """Return the step from roots to solutions."""
     goal = ca.SX.sym("goal", 4, 4)
     angle = ca.SX.sym("angle")
-    of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "is_double")]
-    is_tried, is_real, is_double = of_root
+    of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "closeness")]
+    is_tried, is_real, closeness = of_root
     signs, also = fitting_signs(Numbers.read(parameters[:COUNT]), meeting, goal, angle)
     q, error, is_regular = solution_function(meeting)(parameters[:COUNT], goal, angle, signs)
-    is_delicate = ca.logic_and(is_double != 0.0, ca.logic_not(is_regular))
+    is_singular = ca.logic_and(closeness == BESIDE, ca.logic_not(is_regular))
+    is_delicate = ca.logic_or(closeness == COINCIDES, is_singular)
     inputs = {
         "parameters": parameters,
         "goal": goal,
