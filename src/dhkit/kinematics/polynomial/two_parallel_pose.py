@@ -14,8 +14,8 @@ import casadi as ca
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import orthonormal_goal
 from dhkit.kinematics.polynomial.pose_steps import (
-    COINCIDES,
     BESIDE,
+    COINCIDES,
     RESULTS,
     known_solutions,
     root_steps,
