@@ -15,7 +15,6 @@ from dhkit.kinematics.polynomial.extension import Extension
 from dhkit.kinematics.polynomial.roots_program import (
     BEYOND,
     CONVERGED,
-    ERROR_OF_VALUE,
     FIRST_ANGLE,
     FIRST_RADII,
     MOST_STEPS,
@@ -143,8 +142,7 @@ def _angles(parameters: _SX) -> PipelineStep:
     error = ca.SX.sym("error")
     first = ca.SX.sym("first")
     index, root, others = _root_and_others()
-    tolerance = ca.fmax(ERROR_OF_VALUE, error)
-    angle, height, is_real = nearly_real(polynomial_of(numbers, DEGREE), root, tolerance)
+    angle, height, is_real = nearly_real(polynomial_of(numbers, DEGREE), root, error)
     nearest = ca.SX(math.inf)
     for j, other in enumerate(others):
         nearest = ca.fmin(
@@ -208,7 +206,8 @@ def known_solutions(
     has_more = sum((ca.if_else(x > 0.0, 1.0, 0.0) for x in more), ca.SX(0.0)) > 0.0
     is_alone = ca.logic_not(ca.logic_or(is_delicate, has_more))
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
-    kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, SOLUTION, DOUBTFUL), NONE)
+    of_complex = ca.if_else(is_real != 0.0, DOUBTFUL, NONE)
+    kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, SOLUTION, DOUBTFUL), of_complex)
     q_1, q_2, q_3 = (ca.floor(q[k] / SAME_ANGLE + 0.5) * SAME_ANGLE for k in range(3))
     order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
 

@@ -34,6 +34,9 @@ multiplicity k by its k-th root, 0.013 for k = 8. Whether a solution is there is
 ERROR_OF_VALUE = 1e-11
 """Assumed error of a polynomial near a root, relative to its largest coefficient. The error itself is some 1e-14; the
 four roots of a pose at two singularities, which it moves by 1e-3, are held to be real with this margin only."""
+_UNKNOWN = 100.0
+"""Factor of the coefficients' error: where |f| is smaller, real and complex roots are not told apart. Of published arms
+with offset wrists hardly any pose has such a complex root, of arms whose wrists are almost spherical most have."""
 _MARGIN = 1e4
 """Factor of that error, for roots that are tried."""
 NEAR_ROOTS = 1e-3
@@ -49,7 +52,8 @@ def roots_program(degree: int, samples: int) -> Loop:
 
     - ``angle``, rad, in [-pi, pi]; ``BEYOND`` for a root whose height is beyond ``_NEARLY_REAL``, or which is not real
       even if the error of f is ``_MARGIN`` times the assumed one;
-    - ``is_real``, whether the height is 0 up to the root's error, |height f'| < error of f;
+    - ``is_real``, whether the height is 0 up to the root's error, |height f'| < error of f, or cannot be told from 0,
+      because f at the real angle is hardly larger than the coefficients' error;
     - ``is_delicate``, one number: whether two roots nearly coincide, so that a solution may be singular;
     - ``error``, one number: the largest coefficient beyond the degree, relative to the others; infinite for values that
       are all 0.
@@ -178,12 +182,11 @@ def aberth_step(
 
 def _real_roots(polynomial: list[Extension], roots: _Roots, error: SX) -> dict[str, SX]:
     """Return the outputs of :func:`roots_program`."""
-    tolerance = ca.fmax(ERROR_OF_VALUE, error)
     near = []
     heights = []
     are_real = []
     for root in roots.z:
-        angle, height, is_real = nearly_real(polynomial, root, tolerance)
+        angle, height, is_real = nearly_real(polynomial, root, error)
         near.append(angle)
         heights.append(height)
         are_real.append(is_real)
@@ -206,16 +209,17 @@ def sizes_of(polynomial: list[Extension]) -> list[SX]:
     return [ca.sqrt(c.x * c.x + c.y * c.y) for c in polynomial]
 
 
-def nearly_real(polynomial: list[Extension], root: Extension, tolerance: SX) -> tuple[SX, SX, SX]:
+def nearly_real(polynomial: list[Extension], root: Extension, error: SX) -> tuple[SX, SX, SX]:
     """Return angle, height and whether it is real of a root, as :func:`roots_program` has them.
 
     Parameters
     ----------
     polynomial, root
         The polynomial, and its root.
-    tolerance
-        Error of the polynomial's value.
+    error
+        Error of the coefficients.
     """
+    tolerance = ca.fmax(ERROR_OF_VALUE, error)
     square = root.x * root.x + root.y * root.y
     # ln(square) / 2 of a square near 1, up to its cube.
     height = ca.fabs((square - 1.0) / (square + 1.0))
@@ -224,7 +228,20 @@ def nearly_real(polynomial: list[Extension], root: Extension, tolerance: SX) -> 
     value = height * ca.sqrt(slope.x * slope.x + slope.y * slope.y)
     is_tried = ca.logic_and(height < _NEARLY_REAL, value < _MARGIN * tolerance)
     angle = ca.if_else(is_tried, ca.atan2(root.y, root.x), BEYOND)
-    return angle, height, ca.if_else(value < tolerance, 1.0, 0.0)
+    # Where |f| is that small over a whole interval, the roots in it may be anywhere.
+    is_unknown = ca.fabs(_at_real_angle(polynomial, root)) < _UNKNOWN * ca.fmax(error, _ROUNDING)
+    return angle, height, ca.if_else(ca.logic_or(value < tolerance, is_unknown), 1.0, 0.0)
+
+
+def _at_real_angle(polynomial: list[Extension], root: Extension) -> SX:
+    """Return f = c_0 + 2 Re(c_1 w + c_2 w^2 + ...) at w = z / |z|."""
+    degree = len(polynomial) // 2
+    over_radius = 1.0 / ca.sqrt(root.x * root.x + root.y * root.y)
+    w = complex_of(root.x * over_radius, root.y * over_radius)
+    upper = polynomial[0]
+    for coefficient in polynomial[1:degree]:
+        upper = upper * w + coefficient
+    return polynomial[degree].x + 2.0 * (upper * w).x
 
 
 def square_of_distance(root: Extension, other: Extension) -> SX:

@@ -90,12 +90,13 @@ def expected_roots(
     Parameters
     ----------
     is_near, is_real
-        Whether a root is nearly real, and whether it is real up to its error, shape (N, K) each.
+        Whether a root is nearly real, and whether it is real up to its error or may be, shape (N, K) each.
     error
         Of the polynomials, shape (N, 1), as of :class:`Roots`.
     """
-    # Near poses at several singularities the coefficients cancel, and roots that are real may look complex.
-    is_counted = is_near & (is_real | (error > _WELL_KNOWN))
+    # Near poses at several singularities the coefficients cancel, and roots that are real may look complex. Some are
+    # not nearly real, but too uncertain to be told complex.
+    is_counted = is_real | (is_near & (error > _WELL_KNOWN))
     counts = np.count_nonzero(is_counted, axis=1)
     return np.asarray(np.maximum(counts, is_near.any(axis=1)))
 
