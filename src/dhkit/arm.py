@@ -1773,6 +1773,8 @@ class Arm:
         >>> arm.regressor(*motion, base=True).shape
         (2, 6)
         """
+        if not isinstance(base, bool):
+            raise TypeError(f"base is {type(base).__name__}; expected True or False")
         call = self._calls.base_regressor if base else self._calls.regressor
         if threads is _ONE_THREAD and (Y := call(q, qd, qdd, out)) is not None:
             return Y

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -123,3 +125,22 @@ def test_results_of_an_arm_are_new_arrays():
     there = place(first)
     del first
     assert place(arm.fk(q)) == there
+
+
+def test_whoever_holds_the_base_alone_holds_the_memory():
+    first = large_array(SHAPE)
+    first[:] = 5.0
+    base = first.base
+    del first
+    large_array(SHAPE)[:] = 6.0
+    assert (np.asarray(base) == 5.0).all()
+    assert not hasattr(base, "close")
+
+
+def test_nothing_is_kept_where_addresses_are_bounded():
+    code = (
+        "import resource, numpy as np; from dhkit.kernels import large_arrays;"
+        "resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30));"
+        "x = large_arrays.large_array((4_000_000,)); del x; assert not large_arrays._kept"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

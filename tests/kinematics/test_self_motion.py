@@ -8,6 +8,7 @@ import pytest
 from dhkit import Arm
 from dhkit.description import from_dh
 from dhkit.kinematics import manipulability
+from dhkit.kinematics.preference import share_of_limits
 
 SMALL = 1e-3
 """Length of a step along the self-motion, rad, at which scores are compared."""
@@ -123,3 +124,40 @@ def test_a_preference_that_does_not_fit_is_refused(panda):
         ValueError, match="puma560 is not redundant: 6 joints move the tool in 6 directions"
     ):
         puma.ik_numeric(puma.fk("nominal"), prefer="limits")
+
+
+def test_a_joint_whose_limits_leave_no_room_does_not_move(panda):
+    numbers = panda.description.numbers
+    lower = numbers.lower.copy()
+    upper = numbers.upper.copy()
+    lower[2] = upper[2] = 0.3
+    arm = panda.with_limits(lower=lower, upper=upper)
+    q = random_states(panda, 20)
+    q[:, 2] = 0.3
+    T = arm.fk(q)
+    for aim in ("limits", "ready"):
+        plain = arm.ik_numeric(T)
+        found = arm.ik_numeric(T, prefer=aim)
+        assert (found.valid == plain.valid).all()
+        solved = found.valid[:, 0]
+        assert solved.mean() > 0.9
+        assert (found.q[solved, 0, 2] == 0.3).all()
+    far = panda.ik_numeric(panda.fk("ready"), prefer=np.full(7, 1e300))
+    assert far.valid.all()
+
+
+def test_whole_turns_bring_angles_near_to_a_posture():
+    arm = Arm.load("panda").with_limits(lower=-6.0, upper=6.0)
+    q = np.array([0.3, 0.5, 0.2, -1.2, 0.4, 1.0, 0.1])
+    posture = q + 2 * np.pi * np.array([0, 0, 0, 1, 0, -1, 0])
+    found = arm.ik_numeric(arm.fk(q), q0=q, prefer=posture).q[0]
+    assert np.abs(found - posture).max() < 1e-4
+
+
+def test_the_distance_from_limits_never_falls(panda):
+    T = panda.fk(random_states(panda, 300))
+    plain = panda.ik_numeric(T).q[:, 0]
+    found = panda.ik_numeric(T, prefer="limits").q[:, 0]
+    numbers = panda.description.numbers
+    before, after = (share_of_limits(numbers.lower, numbers.upper, q) for q in (plain, found))
+    assert (after >= before).all()

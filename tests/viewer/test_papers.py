@@ -24,7 +24,10 @@ def values():
         "arm": arm,
         "motion": arm.plan(np.zeros(6), goal),
         "simulation": gentle,
-        "controllers": {"gentle": gentle, "the same once more": gentle},
+        "controllers": {
+            "gentle": gentle,
+            "the same, with a name as long as students like to write them in a report": gentle,
+        },
         "workspace": arm.workspace(),
         "ellipsoid": velocity_ellipsoid(arm, goal),
     }
@@ -45,7 +48,7 @@ def all_values():
     return values()
 
 
-@pytest.mark.parametrize("width", [88, 180])
+@pytest.mark.parametrize("width", [60, 88, 130, 180])
 @pytest.mark.parametrize(
     "name", ["arm", "motion", "simulation", "controllers", "workspace", "ellipsoid"]
 )
@@ -77,5 +80,5 @@ def test_in_a_column_diagrams_are_below_each_other(all_values):
 
 @pytest.mark.parametrize("width", [3.5, 0, -88, 1000, float("nan")])
 def test_other_widths_are_refused(width):
-    with pytest.raises(ValueError, match="expected 30 to 500 mm"):
+    with pytest.raises(ValueError, match="expected 60 to 500 mm"):
         plot(Arm.load("planar2r"), width=width)

@@ -23,10 +23,26 @@ _MOST_KEPT = 512 << 20
 _LARGEST_RATIO = 2
 """A block is used for results of at least its size over this number."""
 _CAN_KEEP = all(hasattr(mmap, name) for name in ("MADV_FREE", "MADV_HUGEPAGE", "MAP_PRIVATE"))
+"""Whether the system takes back the pages of blocks that wait."""
 
 _kept: list[mmap.mmap] = []
 """Blocks that wait, the oldest first. Lists are changed by single operations only: results are dropped at any time, in
 any thread."""
+
+
+class _Owner:
+    """Owns a block while an array, or whatever was made from it, needs it: what NumPy calls the array's base."""
+
+    __slots__ = ("__array_interface__", "__weakref__")
+
+    def __init__(self, block: mmap.mmap, shape: tuple[int, ...]) -> None:
+        address = np.frombuffer(block, np.uint8).__array_interface__["data"][0]
+        self.__array_interface__ = {
+            "version": 3,
+            "typestr": np.dtype(np.float64).str,
+            "shape": shape,
+            "data": (address, False),
+        }
 
 
 def large_array(shape: tuple[int, ...]) -> Array:
@@ -38,7 +54,7 @@ def large_array(shape: tuple[int, ...]) -> Array:
         Its shape.
     """
     size = 8 * math.prod(shape)
-    if size < _SMALLEST or not _CAN_KEEP:
+    if size < _SMALLEST or not _CAN_KEEP or _has_bounded_addresses():
         return np.empty(shape)
     block = _waiting(size)
     if block is None:
@@ -50,11 +66,17 @@ def large_array(shape: tuple[int, ...]) -> Array:
         # Where the system has no large pages, small ones do.
         with contextlib.suppress(OSError):
             block.madvise(mmap.MADV_HUGEPAGE)
-    array = np.ndarray(shape, np.float64, block)
-    # Views of the array keep it alive.
-    dropped = weakref.finalize(array, _keep, block)
+    owner = _Owner(block, shape)
+    dropped = weakref.finalize(owner, _keep, block)
     dropped.atexit = False
-    return array
+    return np.asarray(owner)
+
+
+def _has_bounded_addresses() -> bool:
+    """Return whether the process may use so many addresses only, of which blocks that wait would take some."""
+    import resource
+
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
 
 
 def _waiting(size: int) -> mmap.mmap | None:

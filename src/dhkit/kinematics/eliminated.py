@@ -28,6 +28,9 @@ from dhkit.kinematics.polynomial.solve import SAME_ANGLE
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
+_CLUSTER = 0.05
+"""Distance of singular solutions, rad, below which some of them may be false."""
+
 
 def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T of an arm of six revolute joints, from the roots of a polynomial.
@@ -73,7 +76,7 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     is_delicate = np.zeros(posed.size, dtype=bool)
     is_delicate[rows] = found.is_delicate
     flags = _singular_flags(description, table, is_delicate)
-    is_known = found.is_complete
+    is_known = found.is_complete & ~_have_clusters(table, flags)[rows]
     none_exist = np.zeros(posed.size, dtype=bool)
     if not has_curves(description):
         none_exist[rows] = is_known & (found.counts == 0)
@@ -129,6 +132,22 @@ def _singular_flags(
     return flags
 
 
+def _have_clusters(q: Array, flags: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return which poses have singular solutions that lie near each other, shape (N,), of tables (N, B, 6) and (N, B).
+
+    Where many roots coincide, Newton's method closes at false solutions near the true one.
+    """
+    is_singular = flags & np.uint8(IKFlag.singular) > 0
+    rows = np.flatnonzero(np.count_nonzero(is_singular, axis=1) > 1)
+    singular = np.where(is_singular[rows, :, None], q[rows], np.nan)
+    apart = 2 * np.abs(np.sin((singular[:, :, None] - singular[:, None]) / 2)).max(axis=-1)
+    apart[:, np.arange(q.shape[1]), np.arange(q.shape[1])] = np.nan
+    have = np.zeros(len(q), dtype=bool)
+    # Comparisons with NaN are false.
+    have[rows] = (apart < _CLUSTER).any(axis=(1, 2))
+    return have
+
+
 @lru_cache(maxsize=64)
 def has_curves(description: Description) -> bool:
     """Return whether the arm never moves its tool in as many directions as it has joints, so that joints are redundant.
@@ -155,7 +174,9 @@ def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
     """
     counts = np.bincount(owner, minlength=poses)
     # Angles are rounded, and those of joints 2 and 3 count where the ones before are equal.
-    q_1, q_2, q_3 = np.rint(q[:, :3].T / SAME_ANGLE) * SAME_ANGLE
+    # Angles at -pi are those at pi.
+    around = np.where(q[:, :3] < SAME_ANGLE - np.pi, q[:, :3] + 2 * np.pi, q[:, :3])
+    q_1, q_2, q_3 = np.rint(around.T / SAME_ANGLE) * SAME_ANGLE
     by_joints = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
     place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
     shape = (poses, max(1, int(counts.max(initial=0))))

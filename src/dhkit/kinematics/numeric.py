@@ -88,7 +88,8 @@ def solve_numerically(
         Whether joints stay inside their limits. Otherwise a flag tells where they are not.
     prefer
         What the solution of a redundant arm is moved for along its self-motion, with the tool at rest, to a local
-        maximum: ``"limits"``, the smallest distance from a limit as a share of half the joint's range;
+        maximum: ``"limits"``, the smallest distance from a limit as a share of half the joint's range, or a smooth
+        bound of it that is up to 6 % of the range off for seven joints;
         ``"manipulability"``, that of :func:`dhkit.kinematics.manipulability` for whole motions, or for translations
         with ``position_only``; or joint positions (n,), rad and m, or the name of a configuration, to come near to.
     threads

@@ -47,3 +47,17 @@ def checked_preference(description: Description, prefer: Preference) -> Preferre
                 f"prefer is {prefer!r}; expected 'limits', 'manipulability', joint positions or a configuration"
             )
     return Preferred("posture", joint_vector(description, prefer, "prefer"))
+
+
+def share_of_limits(lower: Array, upper: Array, q: Array) -> Array:
+    """Return the smallest distance of joint positions (..., n) from a limit, as a share of half the joint's range.
+
+    Joints without limits, and those that cannot move, do not count.
+    """
+    has_limits = np.isfinite(upper - lower) & (upper > lower)
+    begin = lower[has_limits]
+    end = upper[has_limits]
+    with_limits = q[..., has_limits]
+    shares = np.minimum(with_limits - begin, end - with_limits) / ((end - begin) / 2)
+    smallest: Array = shares.min(axis=-1, initial=1.0)
+    return smallest

@@ -35,7 +35,7 @@ from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
 from dhkit.kinematics.eliminated import elimination_kernels, solve_by_elimination
 from dhkit.kinematics.manipulability import manipulability
 from dhkit.kinematics.numeric import solve_numerically
-from dhkit.kinematics.preference import Preference, checked_preference
+from dhkit.kinematics.preference import Preference, checked_preference, share_of_limits
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import Solver, solve_in_closed_form, solver_for
 
@@ -331,21 +331,10 @@ def _score_of(description: Description, prefer: Preference) -> _Score:
     aim, posture = checked_preference(description, prefer)
     numbers = description.numbers
     if aim == "limits":
-        return _Score(partial(_share_of_limits, numbers.lower, numbers.upper))
+        return _Score(partial(share_of_limits, numbers.lower, numbers.upper))
     if aim == "manipulability":
         return _Score(lambda q: manipulability(description, q, "whole"))
     return _Score(lambda q: -np.sum((q - posture) ** 2, axis=-1), posture)
-
-
-def _share_of_limits(lower: Array, upper: Array, q: Array) -> Array:
-    """Return the smallest distance of joint positions (..., 7) from a limit, as a share of half the joint's range."""
-    has_limits = np.isfinite(upper - lower)
-    begin = lower[has_limits]
-    end = upper[has_limits]
-    with_limits = q[..., has_limits]
-    shares = np.minimum(with_limits - begin, end - with_limits) / ((end - begin) / 2)
-    smallest: Array = shares.min(axis=-1, initial=1.0)
-    return smallest
 
 
 def _preferred_values(solver: _AtRedundancy, T: Array, score: _Score, threads: int) -> Array:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from dhkit.description import Array
 from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.newton import Newton
-from dhkit.kinematics.preference import Aim, Preferred
+from dhkit.kinematics.preference import Aim, Preferred, share_of_limits
 from dhkit.symbolic import Loop, table_pattern
 
 
 def improve_by_self_motion(
     newton: Newton, goals: Array, q: Array, preferred: Preferred, tolerance: float
 ) -> Array:
-    """Return solutions with the same poses and better scores, shape (N, n), rad and m.
+    """Return solutions with the same poses and scores that are not worse, shape (N, n), rad and m.
 
-    See :func:`dhkit.kinematics.self_motion_program.self_motion_program`: the ends are local maxima.
+    See :func:`dhkit.kinematics.self_motion_program.self_motion_program`: the ends are local maxima. Angles near a
+    posture get the whole turns that bring them nearest to it inside the limits.
 
     Parameters
     ----------
@@ -44,6 +47,19 @@ def improve_by_self_motion(
         ],
         [better],
     )
+    lower = newton.lower
+    upper = newton.upper
+    is_usable = np.isfinite(better).all(axis=1)
+    if preferred.aim == "limits":
+        # A smooth score stands for the smallest distance.
+        is_usable &= share_of_limits(lower, upper, better) >= share_of_limits(lower, upper, q)
+    better = np.where(is_usable[:, None], better, q)
+    if preferred.aim == "posture":
+        turns = np.rint((preferred.posture - better) / math.tau)
+        first = np.ceil((lower - better) / math.tau)
+        last = np.floor((upper - better) / math.tau)
+        has_limits = np.isfinite(upper - lower) & ~newton.description.numbers.prismatic
+        better = better + math.tau * np.where(has_limits, np.clip(turns, first, last), 0.0)
     return better
 
 

@@ -89,15 +89,17 @@ class _SelfMotion:
         if self.aim == "posture":
             squares = []
             for i, x in enumerate(ca.vertsplit((q - self.posture) / arm.units)):
-                # Of a joint that turns without end, 2 - 2 cos x is about x^2 and counts no whole turns.
-                squares.append(ca.if_else(endless[i], 2.0 - 2.0 * ca.cos(x), x * x))
+                # Whole turns of a joint that turns without end do not count.
+                around = x - math.tau * ca.floor(x / math.tau + 0.5)
+                x = ca.if_else(endless[i], around, x)
+                squares.append(x * x)
             return -sum(squares)
         if self.aim == "limits":
             powers = []
             for i, x in enumerate(ca.vertsplit(q)):
                 half = (arm.upper[i] - arm.lower[i]) / 2
                 share = (x - (arm.upper[i] + arm.lower[i]) / 2) / half
-                has_limits = half < math.inf
+                has_limits = ca.logic_and(half < math.inf, half > 0.0)
                 power = share
                 for _ in range(_DOUBLINGS):
                     power = power * power

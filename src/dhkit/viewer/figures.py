@@ -55,7 +55,7 @@ def plot(value: object, *, q: ArrayLike | None = None, width: float | None = Non
     TypeError
         The type has no figure; the message names the types that have one.
     ValueError
-        ``q`` does not fit; ``width`` is below 30 or above 500 mm.
+        ``q`` does not fit; ``width`` is below 60 or above 500 mm.
 
     Examples
     --------

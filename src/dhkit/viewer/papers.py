@@ -14,7 +14,7 @@ _MM = 1 / 25.4
 """Inches."""
 _NARROW = 130.0
 """Width below which diagrams that were side by side are below each other, mm."""
-_LEAST, _MOST = 30.0, 500.0
+_LEAST, _MOST = 60.0, 500.0
 """Smallest and largest width, mm."""
 _TEXT = 7.0
 _TITLE = 8.0
@@ -29,6 +29,10 @@ _LETTER = 1.45
 _TITLE_LETTER = 1.85
 _HANDLE = 7.0
 """Width of a letter of text and of titles, and of a line in a legend with the space about it, mm."""
+_NAMES = 0.3
+"""Share of the figure's width that names beside a diagram may take."""
+_LEAST_LETTERS = 8
+"""Smallest number of letters of a line."""
 _ZOOM = 0.86
 _ZOOM_BY_WIDTH = 0.0083
 """Largest zoom of a drawing in space, and the zoom for each mm, at which the labels of its axes are not cut off."""
@@ -47,7 +51,7 @@ def fit_to_width(figure: Figure, width: float) -> None:
     Raises
     ------
     ValueError
-        ``width`` is below 30 or above 500 mm.
+        ``width`` is below 60 or above 500 mm.
     """
     if not _LEAST <= width <= _MOST:
         raise ValueError(f"width is {width} mm; expected {_LEAST:g} to {_MOST:g} mm")
@@ -104,6 +108,8 @@ def _print_text(figure: Figure, width: float, columns: int) -> None:
     if figure.get_suptitle():
         letters = int(width / _TITLE_LETTER)
         titles.append(figure.suptitle(textwrap.fill(figure.get_suptitle(), letters), weight="bold"))
+    for axes in figure.axes:
+        _wrap_names(axes, width, figure.get_figheight() / _MM)
     for text in figure.findobj(Text):
         largest = _TITLE if text in titles else _TEXT
         text.set_fontsize(min(text.get_fontsize(), largest))
@@ -113,10 +119,37 @@ def _print_text(figure: Figure, width: float, columns: int) -> None:
             axis.labelpad = min(axis.labelpad, 2)
 
 
+def _wrap_names(axes: Axes, width: float, height: float) -> None:
+    """Break the names of axes, and names at the ticks of one, such as those of controllers, into lines that fit.
+
+    Parameters
+    ----------
+    axes
+        A diagram.
+    width, height
+        Of the figure, mm.
+    """
+    box = axes.get_position()
+    letters = max(_LEAST_LETTERS, int(_NAMES * width / _LETTER))
+    names = [label.get_text() for label in axes.yaxis.get_ticklabels()]
+    is_formula = any("$" in name for name in names)
+    if max(map(len, names), default=0) > letters and not is_formula:
+        wrapped = [textwrap.fill(one, letters, max_lines=2, placeholder=" …") for one in names]
+        axes.set_yticks(axes.get_yticks(), wrapped)
+    for label, length in (
+        (axes.xaxis.label, box.width * width),
+        (axes.yaxis.label, box.height * height),
+    ):
+        letters = max(_LEAST_LETTERS, int(length / _LETTER))
+        label.set_text(textwrap.fill(label.get_text(), letters))
+
+
 def _refill(figure: Figure, legend: Legend, width: float) -> None:
     """Make a legend again, with as many columns as fit."""
     labels = [text.get_text() for text in legend.get_texts()]
-    entry = _HANDLE + _LETTER * max(map(len, labels))
+    letters = int((width - _HANDLE) / _LETTER)
+    labels = [textwrap.fill(label, letters) for label in labels]
+    entry = _HANDLE + _LETTER * max(len(line) for label in labels for line in label.split("\n"))
     handles = [handle for handle in legend.legend_handles if handle is not None]
     legend.remove()
     figure.legend(

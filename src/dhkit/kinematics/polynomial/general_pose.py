@@ -22,6 +22,7 @@ import casadi as ca
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import BASE_DAMPING, orthonormal_goal
 from dhkit.kinematics.newton_program import levenberg_step, pose_error
+from dhkit.kinematics.polynomial.pivots import eliminated, not_zero
 from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, root_steps
 from dhkit.kinematics.polynomial.trigonometric import ROOTS, SAMPLES
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
@@ -294,43 +295,12 @@ def _matrix(six: _SX, cosine: _SX, sine: _SX) -> list[list[_SX]]:
     return by_cosine + by_sine
 
 
-def _eliminated(
-    matrix: list[list[_SX]], right: list[_SX] | None = None
-) -> tuple[list[list[_SX]], list[_SX], _SX]:
-    """Return a matrix and a right side after Gauss's elimination with row pivots, and the sign of the exchanges."""
-    A = [list(row) for row in matrix]
-    if right is not None:
-        A = [[*row, x] for row, x in zip(A, right, strict=True)]
-    size = len(matrix)
-    sign = ca.SX(1.0)
-    for k in range(size):
-        for row in range(k + 1, size):
-            is_larger = ca.fabs(A[row][k]) > ca.fabs(A[k][k])
-            sign = ca.if_else(is_larger, -sign, sign)
-            for column in range(k, len(A[k])):
-                upper = A[k][column]
-                lower = A[row][column]
-                A[k][column] = ca.if_else(is_larger, lower, upper)
-                A[row][column] = ca.if_else(is_larger, upper, lower)
-        over = 1.0 / _not_zero(A[k][k])
-        for row in range(k + 1, size):
-            factor = A[row][k] * over
-            for column in range(k + 1, len(A[k])):
-                A[row][column] = A[row][column] - factor * A[k][column]
-    return A, [row[-1] for row in A], sign
-
-
-def _not_zero(x: _SX) -> _SX:
-    """Return a pivot, or a number that is hardly larger than 0."""
-    return ca.if_else(x == 0.0, _TINY, x)
-
-
 def _determinants(parameters: _SX) -> PipelineStep:
     """Return the step with the determinants at equally spaced angles of joint i, and how far from singular they are."""
     six = ca.SX.sym("six", WITHOUT * 3 * NEAR)
     index = ca.SX.sym("index")
     angle = _FIRST_ANGLE + index * (math.tau / SAMPLES)
-    A, _, determinant = _eliminated(_matrix(six, ca.cos(angle), ca.sin(angle)))
+    A, _, determinant = eliminated(_matrix(six, ca.cos(angle), ca.sin(angle)))
     pivots = [ca.fabs(A[k][k]) for k in range(len(A))]
     for k in range(len(A)):
         determinant = determinant * A[k][k]
@@ -405,11 +375,11 @@ def _near_angles(matrix: list[list[_SX]]) -> tuple[_SX, _SX]:
     """
     size = len(matrix)
     b = [ca.SX(math.cos(2.0 + 5.0 * k)) for k in range(size)]
-    A, right, _ = _eliminated(matrix, b)
+    A, right, _ = eliminated(matrix, b)
     x: list[_SX] = [ca.SX(0.0)] * size
     for k in reversed(range(size)):
         rest = right[k] - sum((A[k][m] * x[m] for m in range(k + 1, size)), ca.SX(0.0))
-        x[k] = rest / _not_zero(A[k][k])
+        x[k] = rest / not_zero(A[k][k])
     largest = x[0] * 0.0
     for entry in x:
         largest = ca.fmax(largest, ca.fabs(entry))
@@ -436,7 +406,7 @@ def _far_angles(right: _SX, reflections: _SX, R: _SX) -> tuple[_SX, _SX]:
     p: list[_SX] = [ca.SX(0.0)] * FAR
     for k in reversed(range(FAR)):
         rest = turned[k] - sum((rows[k][m - k] * p[m] for m in range(k + 1, FAR)), ca.SX(0.0))
-        p[k] = rest / _not_zero(rows[k][0])
+        p[k] = rest / not_zero(rows[k][0])
     return ca.atan2(p[5], p[2]), ca.atan2(p[1], p[0])
 
 

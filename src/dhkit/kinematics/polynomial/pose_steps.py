@@ -208,7 +208,9 @@ def known_solutions(
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
     of_complex = ca.if_else(is_real != 0.0, DOUBTFUL, NONE)
     kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, SOLUTION, DOUBTFUL), of_complex)
-    q_1, q_2, q_3 = (ca.floor(q[k] / SAME_ANGLE + 0.5) * SAME_ANGLE for k in range(3))
+    # Angles at -pi are those at pi.
+    around = [ca.if_else(q[k] < SAME_ANGLE - math.pi, q[k] + math.tau, q[k]) for k in range(3)]
+    q_1, q_2, q_3 = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
     order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
 
     # lower <= q + 2 pi k <= upper for some whole k.

@@ -75,7 +75,7 @@ class Found:
     is_exact: NDArray[np.bool_]
     """Whether the polynomial is known well enough for that number, shape (N,)."""
     is_delicate: NDArray[np.bool_]
-    """Whether two roots of the polynomial nearly coincide, so that a solution may be singular, shape (N,)."""
+    """Whether a solution may be singular, shape (N,): two roots nearly coincide, or a solution is not at its root."""
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:
@@ -137,7 +137,8 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
         is_one[rows] = are_distinct(q[rows], owner[rows])
         q = q[is_one]
         owner = owner[is_one]
-    return Found(q, owner, found.expected, found.error_of_polynomial < INEXACT, found.is_delicate)
+    # What Newton's method moved may be singular as well.
+    return Found(q, owner, found.expected, found.error_of_polynomial < INEXACT, is_doubtful)
 
 
 def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any, TypeAlias
 
 import casadi as ca
 
 from dhkit.kinematics.closed_form.formulas import turned_about_x, turned_about_z
 from dhkit.kinematics.polynomial.extension import SIGNS, Element, Extension, Root
+from dhkit.kinematics.polynomial.pivots import determinant
 from dhkit.symbolic import Graph
 
 SX: TypeAlias = Any
@@ -28,9 +28,8 @@ _POLISHING_STEPS = 2
 """Newton steps from a root of the polynomial, whose error is about 1e-10 rad, to rounding."""
 _LARGEST_STEP = 1e-3
 """Larger steps, rad, are not taken: near a double root they lead elsewhere."""
-_REGULAR_SLOPE = 1e-2
-_REGULAR_SQUARE = 1e-4
-"""Least |F'| and least square of a solution that is known to be regular."""
+_REGULAR = 1e-4
+"""Least singular value of a solution that is known to be regular."""
 _ALSO_FITS = 1e-6
 """Residual, a share of the squared reach, of combinations of signs that may also be solutions: two at the same q1."""
 
@@ -58,7 +57,7 @@ def fitting_signs(p: Numbers, meeting: tuple[int, int], T: SX, q_1: SX) -> tuple
     signs = ca.SX([math.nan, math.nan])
     residuals = []
     for some in SIGNS:
-        arm, deficit, _ = _real(p, meeting, T, q_1, some)
+        arm, deficit = _real(p, meeting, T, q_1, some)
         residual = ca.fabs(arm.F) + deficit
         residuals.append(residual)
         is_better = residual < least
@@ -88,19 +87,15 @@ def joints_program(meeting: tuple[int, int]) -> Graph:
 def solution_function(meeting: tuple[int, int]) -> ca.Function:
     """Return the function of :func:`joints_program`: parameters, T, q1 and signs to q, its error, and if it is regular.
 
-    A solution is singular where F' is 0, or a square whose root is taken, or a denominator. Solutions at nearly equal
-    roots of the polynomial may well be regular: those of an elbow above and below belong to different signs.
+    Solutions at nearly equal roots of the polynomial may well be regular: those of an elbow above and below are.
     """
     parameters, T = symbols()
     q_1 = ca.SX.sym("q_1")
     signs = ca.SX.sym("signs", 2)
     p = Numbers.read(parameters)
 
-    arm, _, least_square = _real(p, meeting, T, q_1, (signs[0], signs[1]))
-    slope = ca.jacobian(arm.F, q_1)
-    roots = reduce(ca.fmin, (least_square, *arm.denominators))
-    is_regular = ca.logic_and(ca.fabs(slope) > _REGULAR_SLOPE, roots > _REGULAR_SQUARE)
-    step = arm.F / slope
+    arm, _ = _real(p, meeting, T, q_1, (signs[0], signs[1]))
+    step = arm.F / ca.jacobian(arm.F, q_1)
     is_small = ca.fabs(step) < _LARGEST_STEP
     better = ca.Function(
         "better", [parameters, T, q_1, signs], [ca.if_else(is_small, q_1 - step, q_1)]
@@ -109,7 +104,7 @@ def solution_function(meeting: tuple[int, int]) -> ca.Function:
     for _ in range(_POLISHING_STEPS):
         x = better(parameters, T, x, signs)
 
-    arm, _, _ = _real(p, meeting, T, x, (signs[0], signs[1]))
+    arm, _ = _real(p, meeting, T, x, (signs[0], signs[1]))
     # Link 2 has the direction q2, link 3 that of q2 + sense q3.
     sense = p.alpha[2][0]
     theta_2 = ca.atan2(arm.link_2[1], arm.link_2[0])
@@ -120,16 +115,29 @@ def solution_function(meeting: tuple[int, int]) -> ca.Function:
     thetas = [theta_2, theta_3, *(ca.atan2(sine, cosine) for cosine, sine in arm.wrist)]
     q = [x, *(theta - p.offset[k] for k, theta in enumerate(thetas, start=1))]
     q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
-    outputs = [ca.vertcat(*q), _error(p, T, q), is_regular]
+    error, J = _error_and_jacobian(p, T, q)
+    outputs = [ca.vertcat(*q), error, _is_regular(J)]
     return ca.Function("solution", [parameters, T, q_1, signs], outputs)
 
 
-def _error(p: Numbers, T: SX, q: list[SX]) -> SX:
-    """Return the error of the tool's pose at joint values."""
+def _is_regular(J: SX) -> SX:
+    """Return whether a Jacobian of shares of the reach has no singular value below 1e-4.
+
+    The product of the five larger singular values is at most (|J|^2 / 5)^(5/2), with the squares' sum |J|^2.
+    """
+    rows = [[J[row, column] for column in range(6)] for row in range(6)]
+    mean = ca.sumsqr(J) / 5.0
+    return ca.fabs(determinant(rows)) > _REGULAR * mean * mean * ca.sqrt(mean)
+
+
+def _error_and_jacobian(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX]:
+    """Return the error of the tool's pose at joint values, and its Jacobian, 6 x 6, lengths as shares of the reach."""
     R_goal, p_goal = last_frame(p, T)
     R = ca.SX.eye(3)
     position = ca.SX.zeros(3)
+    axes = []
     for k, angle in enumerate(q, start=1):
+        axes.append((R[:, 2], position))
         # Joint k turns about z, link k leads along z and x, and turns about x.
         R = R @ _rotation(2, *_pair(angle + p.offset[k - 1]))
         if k < len(q):
@@ -141,7 +149,10 @@ def _error(p: Numbers, T: SX, q: list[SX]) -> SX:
     tool = p.T_tool_last[:, :3].T @ -p.T_tool_last[:, 3]
     shift = p_goal - position + turned @ tool
     # |R_g - R|_F = sqrt(8) sin(t / 2) for rotations that are t apart: over sqrt(2) it is t for small ones.
-    return ca.sqrt(ca.fmax(ca.sumsqr(shift), ca.sumsqr(turned) / 2.0))
+    error = ca.sqrt(ca.fmax(ca.sumsqr(shift), ca.sumsqr(turned) / 2.0))
+    end = position + R @ tool
+    columns = [ca.vertcat(ca.cross(axis, end - origin), axis) for axis, origin in axes]
+    return error, ca.horzcat(*columns)
 
 
 def _pair(angle: SX) -> Pair:
@@ -161,8 +172,8 @@ def symbols() -> tuple[SX, SX]:
 
 def _real(
     p: Numbers, meeting: tuple[int, int], T: SX, q_1: SX, signs: tuple[SX, SX]
-) -> tuple[_Arms, SX, SX]:
-    """Return the arm with roots of given signs, the sum of negative squares (counted as 0), and the least square."""
+) -> tuple[_Arms, SX]:
+    """Return the arm with roots of given signs, and the sum of the negative squares, which count as 0."""
     squares = []
 
     def take_root(square: Element, level: int) -> Element:
@@ -172,7 +183,7 @@ def _real(
     theta_1 = (ca.cos(q_1), ca.sin(q_1))
     arm = _assembled(p, meeting, T[:3, :], theta_1, take_root)
     first, second = squares
-    return arm, ca.fmax(-first, 0.0) + ca.fmax(-second, 0.0), ca.fmin(first, second)
+    return arm, ca.fmax(-first, 0.0) + ca.fmax(-second, 0.0)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,51 @@
+"""Gauss's elimination in symbols, with row pivots, for programs whose items choose different pivots."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+_SX: TypeAlias = Any
+"""A CasADi SX scalar or matrix."""
+_TINY = 1e-300
+"""Pivot instead of 0."""
+
+
+def eliminated(
+    matrix: list[list[_SX]], right: list[_SX] | None = None
+) -> tuple[list[list[_SX]], list[_SX], _SX]:
+    """Return a matrix and a right side after Gauss's elimination with row pivots, and the sign of the exchanges."""
+    A = [list(row) for row in matrix]
+    if right is not None:
+        A = [[*row, x] for row, x in zip(A, right, strict=True)]
+    size = len(matrix)
+    sign = ca.SX(1.0)
+    for k in range(size):
+        for row in range(k + 1, size):
+            is_larger = ca.fabs(A[row][k]) > ca.fabs(A[k][k])
+            sign = ca.if_else(is_larger, -sign, sign)
+            for column in range(k, len(A[k])):
+                upper = A[k][column]
+                lower = A[row][column]
+                A[k][column] = ca.if_else(is_larger, lower, upper)
+                A[row][column] = ca.if_else(is_larger, upper, lower)
+        over = 1.0 / not_zero(A[k][k])
+        for row in range(k + 1, size):
+            factor = A[row][k] * over
+            for column in range(k + 1, len(A[k])):
+                A[row][column] = A[row][column] - factor * A[k][column]
+    return A, [row[-1] for row in A], sign
+
+
+def not_zero(x: _SX) -> _SX:
+    """Return a pivot, or a number that is hardly larger than 0."""
+    return ca.if_else(x == 0.0, _TINY, x)
+
+
+def determinant(matrix: list[list[_SX]]) -> _SX:
+    """Return the determinant."""
+    A, _, product = eliminated(matrix)
+    for k in range(len(A)):
+        product = product * A[k][k]
+    return product
