@@ -49,7 +49,7 @@ def improve_by_self_motion(
     )
     lower = newton.lower
     upper = newton.upper
-    is_usable = np.isfinite(better).all(axis=1)
+    is_usable = np.asarray(np.isfinite(better).all(axis=1))
     if preferred.aim == "limits":
         # A smooth score stands for the smallest distance.
         is_usable &= share_of_limits(lower, upper, better) >= share_of_limits(lower, upper, q)
