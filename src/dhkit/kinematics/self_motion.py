@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from dhkit.description import Array
 from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.preference import Aim, Preferred, share_of_limits
+from dhkit.kinematics.solutions import wound
 from dhkit.symbolic import Loop, table_pattern
 
 
@@ -55,11 +54,8 @@ def improve_by_self_motion(
         is_usable &= share_of_limits(lower, upper, better) >= share_of_limits(lower, upper, q)
     better = np.where(is_usable[:, None], better, q)
     if preferred.aim == "posture":
-        turns = np.rint((preferred.posture - better) / math.tau)
-        first = np.ceil((lower - better) / math.tau)
-        last = np.floor((upper - better) / math.tau)
-        has_limits = np.isfinite(upper - lower) & ~newton.description.numbers.prismatic
-        better = better + math.tau * np.where(has_limits, np.clip(turns, first, last), 0.0)
+        stays = newton.description.numbers.prismatic | ~np.isfinite(upper - lower)
+        better = wound(better, preferred.posture, lower, upper, stays)
     return better
 
 

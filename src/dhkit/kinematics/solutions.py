@@ -276,14 +276,10 @@ class IKSolutions:
         limits
             Whether angles stay inside the joint limits.
         """
-        # q + 2 pi k with k the whole number nearest to (near - q) / (2 pi), and lower <= q + 2 pi k <= upper.
-        with np.errstate(invalid="ignore"):
-            turns = np.rint((near - q) / math.tau)
-            if limits:
-                first = np.ceil((self.lower - LIMIT_SLACK - q) / math.tau)
-                last = np.floor((self.upper + LIMIT_SLACK - q) / math.tau)
-                turns = np.clip(turns, first, last)
-        return q + math.tau * np.where(self.prismatic | ~np.isfinite(turns), 0.0, turns)
+        if limits:
+            return wound(q, near, self.lower, self.upper, self.prismatic)
+        anywhere = np.full(self.lower.shape, np.inf)
+        return wound(q, near, -anywhere, anywhere, self.prismatic)
 
     def windings(self, branch: str) -> list[Array]:
         """Return all joint values (n,), rad and m, inside the limits that are one pose's branch plus whole turns.
@@ -488,6 +484,27 @@ class IKSolutions:
                 f" by {distance:.4g} m" if distance > 0 else ""
             )
         return f"{where}{others} is reached only outside the joint limits"
+
+
+def wound(q: Array, near: Array, lower: Array, upper: Array, prismatic: NDArray[np.bool_]) -> Array:
+    """Return joint values (..., n), rad and m, with the whole turns that bring each angle nearest to ``near``.
+
+    Parameters
+    ----------
+    q, near
+        Joint values, and those to come near to, shape (..., n).
+    lower, upper
+        Limits that angles keep or come as near to as they can, shape (n,).
+    prismatic
+        Whether each joint is prismatic, shape (n,).
+    """
+    # q + 2 pi k with k the whole number nearest to (near - q) / (2 pi), and lower <= q + 2 pi k <= upper.
+    with np.errstate(invalid="ignore"):
+        turns = np.rint((near - q) / math.tau)
+        first = np.ceil((lower - LIMIT_SLACK - q) / math.tau)
+        last = np.floor((upper + LIMIT_SLACK - q) / math.tau)
+        turns = np.clip(turns, first, last)
+    return q + math.tau * np.where(prismatic | ~np.isfinite(turns), 0.0, turns)
 
 
 def _special(flags: int) -> str:
