@@ -16,8 +16,8 @@ from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.eliminated import branch_names, elimination_kernels, has_curves
 from dhkit.kinematics.polynomial.pose_results import PoseProgram
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import INEXACT
-from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, ROOTS, SOLUTION
+from dhkit.kinematics.polynomial.solve import INEXACT, are_distinct
+from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, NEAR_SOLUTION, NONE, ROOTS
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
 log = logging.getLogger(__name__)
@@ -81,10 +81,12 @@ class EliminatedPoseCall:
         is_known = posed == 1.0 and error < INEXACT
         if not is_known or DOUBTFUL in kinds:
             return None
-        places = [k for k, kind in enumerate(kinds) if kind == SOLUTION]
+        places = [k for k, kind in enumerate(kinds) if kind != NONE]
         count = len(places)
         # Complex roots come in pairs. The ordinary way says whether a pose without solutions is out of reach.
         if count == 0 or count % 2:
+            return None
+        if NEAR_SOLUTION in kinds and not _are_different(q[places]):
             return None
         places.sort(key=roots[1::3].__getitem__)
         are_outside = roots[2::3]
@@ -104,6 +106,11 @@ class EliminatedPoseCall:
             "batch": (),
         }
         return self._shared[count]
+
+
+def _are_different(q: Array) -> bool:
+    """Return whether no two solutions (K, 6) of a pose are the same."""
+    return bool(are_distinct(q, np.zeros(len(q), dtype=np.intp)).all())
 
 
 class EliminationCall:

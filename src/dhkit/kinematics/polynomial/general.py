@@ -187,7 +187,8 @@ class General:
         of_root, q = self._joints_at_roots(motions, side, roots.owner, roots.angle + _FIRST_ANGLE)
         owner = roots.owner[of_root]
         error = magnitude(self.newton.error(q, poses[owner]))
-        return Candidates(q, error, owner, of_root, roots.expected, roots.is_delicate, roots.error)
+        is_near = roots.is_delicate
+        return Candidates(q, error, owner, of_root, roots.expected, is_near, is_near, roots.error)
 
     def _joints_at_roots(
         self, motions: Array, side: _FarSide, owner: NDArray[np.intp], roots: Array

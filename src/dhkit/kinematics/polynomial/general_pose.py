@@ -363,7 +363,9 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
         "angle": angle,
         **{symbol.name(): symbol for symbol in of_root},
     }
-    graph = known_solutions(parameters, inputs, (is_tried, is_real), q, error, closeness > 0.0)
+    graph = known_solutions(
+        parameters, inputs, (is_tried, is_real), q, error, closeness, closeness > 0.0
+    )
     shared = ("goal", "motion", "six", "reflections", "constant", "R")
     return PipelineStep(graph, ROOTS, shared={name: name for name in shared})
 

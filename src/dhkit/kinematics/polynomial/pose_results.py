@@ -46,8 +46,9 @@ class PoseResults:
     """Joint values at the roots, shape (N, 16, 6), rad."""
     is_near: NDArray[np.bool_]
     is_real: NDArray[np.bool_]
+    is_beside: NDArray[np.bool_]
     is_delicate: NDArray[np.bool_]
-    """Whether a root is nearly real, real, and may belong to a singular solution, shape (N, 16) each."""
+    """Whether a root is nearly real, real, near to another, and may have a singular solution, shape (N, 16) each."""
     error: Array
     """Of the joint values, shape (N, 16), shares of the reach and rad."""
     more: Array
@@ -63,12 +64,12 @@ class PoseResults:
         program.pose_kernel(parameters, [poses], outputs)
         q, _, of_roots, _, error_of_polynomial = outputs
         details = of_roots.reshape(len(poses), ROOTS, program.details)
-        is_near, is_real, is_delicate = np.moveaxis(details[:, :, :3] > 0.0, -1, 0)
         return cls(
             q.reshape(len(poses), ROOTS, 6),
-            is_near,
-            is_real,
-            is_delicate,
+            details[:, :, 0] > 0.0,
+            details[:, :, 1] > 0.0,
+            details[:, :, 2] > 0.0,
+            details[:, :, 2] > 1.0,
             details[:, :, 3],
             details[:, :, COMMON_DETAILS:],
             error_of_polynomial,
@@ -83,6 +84,7 @@ class PoseResults:
             owner,
             np.arange(len(owner)),
             expected_roots(self.is_near, self.is_real, self.error_of_polynomial),
+            np.asarray(self.is_beside.any(axis=1)),
             np.asarray(self.is_delicate.any(axis=1)),
             self.error_of_polynomial[:, 0],
         )
@@ -98,6 +100,7 @@ def with_more(found: Candidates, q: Array, error: Array, root: NDArray[np.intp])
         found.owner[roots[order]],
         roots[order],
         found.expected,
+        found.may_repeat,
         found.is_delicate,
         found.error_of_polynomial,
     )
@@ -127,6 +130,7 @@ def with_rows(found: Candidates, rows: NDArray[np.intp], others: Candidates) -> 
         owner[order],
         joined(found.root, first + others.root),
         changed(found.expected, others.expected),
+        changed(found.may_repeat, others.may_repeat),
         changed(found.is_delicate, others.is_delicate),
         changed(found.error_of_polynomial, others.error_of_polynomial),
     )

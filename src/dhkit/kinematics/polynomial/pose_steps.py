@@ -32,6 +32,7 @@ from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE
 from dhkit.kinematics.polynomial.trigonometric import (
     DEGREE,
     DOUBTFUL,
+    NEAR_SOLUTION,
     NONE,
     ROOTS,
     SAMPLES,
@@ -46,10 +47,10 @@ RESULTS = ("q", "summary", "details", "posed", "error")
 """Outputs of a pose's program.
 
 - ``q``, 16 times 6, rad;
-- ``summary``, 16 times 3: what is known of the root (``NONE``, ``SOLUTION`` or ``DOUBTFUL``), the number by which
-  solutions are sorted, and whether a joint is outside its limits;
-- ``details`` of the root, 16 times 4 or more: whether it is nearly real, real, and so near to another that its solution
-  may be singular; the error of its joint values; and more by the way of elimination;
+- ``summary``, 16 times 3: what is known of the root (``NONE``, ``SOLUTION``, ``NEAR_SOLUTION`` or ``DOUBTFUL``), the
+  number by which solutions are sorted, and whether a joint is outside its limits;
+- ``details`` of the root, 16 times 4 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if
+  its solution may be singular; the error of its joint values; and more by the way of elimination;
 - ``posed``, whether T is a pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
@@ -182,6 +183,7 @@ def known_solutions(
     of_root: Sequence[_SX],
     q: _SX,
     error: _SX,
+    closeness: _SX,
     is_delicate: _SX,
     more: Sequence[_SX] = (),
 ) -> Graph:
@@ -197,8 +199,8 @@ def known_solutions(
         Symbols of ``is_tried`` and ``is_real``.
     q, error
         Joint values, 6 x 1, rad, and their error.
-    is_delicate
-        Whether the solution may be singular.
+    closeness, is_delicate
+        Whether another root is near, and whether the solution may be singular.
     more
         Further details, of which none is above 0 at a root that has just one solution.
     """
@@ -207,7 +209,8 @@ def known_solutions(
     is_alone = ca.logic_not(ca.logic_or(is_delicate, has_more))
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
     of_complex = ca.if_else(is_real != 0.0, DOUBTFUL, NONE)
-    kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, SOLUTION, DOUBTFUL), of_complex)
+    one = ca.if_else(closeness > 0.0, NEAR_SOLUTION, SOLUTION)
+    kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, one, DOUBTFUL), of_complex)
     # Angles at -pi are those at pi.
     around = [ca.if_else(q[k] < SAME_ANGLE - math.pi, q[k] + math.tau, q[k]) for k in range(3)]
     q_1, q_2, q_3 = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
@@ -223,7 +226,9 @@ def known_solutions(
         """Return 0 where the root is complex: what follows from it is without meaning."""
         return ca.if_else(is_tried != 0.0, x, 0.0)
 
-    details = [is_tried, is_real, ca.if_else(is_delicate, 1.0, 0.0), *map(at_tried, (error, *more))]
+    is_near = ca.if_else(closeness > 0.0, BESIDE, 0.0)
+    care = ca.if_else(is_delicate, COINCIDES, is_near)
+    details = [is_tried, is_real, care, *map(at_tried, (error, *more))]
     outputs = {
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
         "summary": ca.vertcat(kind, at_tried(order), at_tried(is_outside)),

@@ -56,8 +56,10 @@ class Candidates:
     """The root of each, shape (L,): some roots have several solutions, which are together."""
     expected: NDArray[np.intp]
     """Number of real roots, shape (N,); see :class:`dhkit.kinematics.polynomial.trigonometric.Roots`."""
+    may_repeat: NDArray[np.bool_]
+    """Whether two roots are so near that one solution may be found from both, shape (N,)."""
     is_delicate: NDArray[np.bool_]
-    """Whether two roots nearly coincide, shape (N,)."""
+    """Whether a solution at one of two near roots may be singular, shape (N,)."""
     error_of_polynomial: Array
     """Largest coefficient beyond degree 8, relative to the others, shape (N,)."""
 
@@ -125,8 +127,9 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
         q[moved], closed[moved] = refined(description, q[moved], poses[found.owner[moved]])
 
     # Solutions of a pose that come from roots apart differ in that joint, unless they moved far from their roots.
-    is_doubtful = found.is_delicate.copy()
-    is_doubtful[found.owner[moved]] = True
+    is_moved = np.zeros(len(poses), dtype=bool)
+    is_moved[found.owner[moved]] = True
+    is_doubtful = found.may_repeat | is_moved
     q = q[closed]
     owner = found.owner[closed]
     root = found.root[closed]
@@ -138,7 +141,8 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
         q = q[is_one]
         owner = owner[is_one]
     # What Newton's method moved may be singular as well.
-    return Found(q, owner, found.expected, found.error_of_polynomial < INEXACT, is_doubtful)
+    is_delicate = found.is_delicate | is_moved
+    return Found(q, owner, found.expected, found.error_of_polynomial < INEXACT, is_delicate)
 
 
 def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:

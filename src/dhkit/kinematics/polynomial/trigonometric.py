@@ -31,6 +31,8 @@ NONE = 0.0
 """It is not real: there is no solution."""
 SOLUTION = 1.0
 """There is one solution, and it is not singular."""
+NEAR_SOLUTION = 1.5
+"""There is one solution, and it is not singular; that of a near root may be the same."""
 DOUBTFUL = 2.0
 """It may be real, has several solutions or one that does not close, or nearly coincides with another root."""
 

@@ -110,6 +110,13 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
         **{symbol.name(): symbol for symbol in of_root},
     }
     graph = known_solutions(
-        parameters, inputs, (is_tried, is_real), q, error, is_delicate, ca.vertsplit(also)
+        parameters,
+        inputs,
+        (is_tried, is_real),
+        q,
+        error,
+        closeness,
+        is_delicate,
+        ca.vertsplit(also),
     )
     return PipelineStep(graph, ROOTS, shared={"goal": "goal"})
