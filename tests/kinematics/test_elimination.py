@@ -341,7 +341,7 @@ def test_the_compiled_elimination_finds_what_lapack_finds(name, law):
     T = arm.fk(q).reshape(-1, 16)
     # Poses that are not reached.
     T[5, 3] += 10 * arm.description.reach
-    compiled = solve(arm.description, elimination, T)
+    compiled = six_joints(arm.description)(T)
     by_lapack = solve(arm.description, elimination.lapack, T)
     assert np.mean(compiled.counts == by_lapack.counts) > 0.98
     found = np.abs(np.angle(np.exp(1j * (compiled.q - q[compiled.owner])))).max(axis=1) < 1e-6
@@ -379,9 +379,10 @@ def test_single_calls_find_what_batches_find(name, law):
         apart = np.abs(alone.q - batch.q[k, :count]).max()
         assert apart < (1e-9 if is_regular[k] else SAME_ANGLE)
         assert alone.valid.all() and alone.complete
-        assert alone.status == batch.status[k] == "ok"
-        assert (alone.flags == batch.flags[k, :count]).all()
         assert alone.distance == 0.0
+        if is_regular[k]:
+            assert alone.status == batch.status[k] == "ok"
+            assert (alone.flags == batch.flags[k, :count]).all()
         assert alone.branches == batch.branches[:count]
     assert taken > 0.5 * len(T)
 
