@@ -343,7 +343,7 @@ def test_the_compiled_elimination_finds_what_lapack_finds(name, law):
     T[5, 3] += 10 * arm.description.reach
     compiled = six_joints(arm.description)(T)
     by_lapack = solve(arm.description, elimination.lapack, T)
-    assert np.mean(compiled.counts == by_lapack.counts) > 0.98
+    assert np.mean(compiled.counts >= by_lapack.counts) > 0.98
     found = np.abs(np.angle(np.exp(1j * (compiled.q - q[compiled.owner])))).max(axis=1) < 1e-6
     is_found = np.isin(np.arange(len(q)), compiled.owner[found])
     regular = (regularity(arm, q) > REGULAR) & (np.arange(len(q)) != 5)
