@@ -115,7 +115,9 @@ class RedundantCall:
         """
         if type(redundancy) is not float or type(T) is not np.ndarray or T.ndim != 2:
             return None
-        found = self._poses.call(T, np.array([0.0, redundancy]), None)
+        free = _NO_SEED.copy()
+        free[1] = redundancy
+        found = self._poses.call(T, free, None)
         # The ordinary way tells a pose that another redundancy may reach from others.
         if found is None:
             return None
@@ -123,7 +125,7 @@ class RedundantCall:
         if packed[-1] not in _REACHED:
             return None
         shared = self._poses.shared
-        return IKSolutions.of_packed(q, packed, shared, False, np.array(redundancy))
+        return IKSolutions.of_packed(q, packed, shared, False, free[1, ...])
 
 
 def _may_share_memory(T: Any, out: Any) -> bool:
