@@ -45,10 +45,11 @@ from dhkit.execution.isolation import Kind
 from dhkit.expressions import Atom, Budget, Expression, parse
 from dhkit.kernels import Kernel, SingleCall
 from dhkit.kinematics.descent_program import descent_program
+from dhkit.kinematics.polynomial.two_parallel_pose import pose_program
 from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
 from dhkit.planning.certificate.checker import Check
-from dhkit.symbolic import Loop
+from dhkit.symbolic import Loop, Pipeline, PipelineStep
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics
 from dhkit.trajectories.pieces import Pieces
@@ -395,6 +396,8 @@ VALUES = {
     Expression: long_sum,
     Kernel: lambda: kinematic_kernels(planar().description)[0],
     Loop: lambda: descent_program(planar().description, 3),
+    Pipeline: lambda: pose_program((5, 6)),
+    PipelineStep: lambda: pose_program((5, 6)).steps[-1],
     SingleCall: lambda: planar()._calls.fk,
     ForwardDynamicsDerivatives: lambda: planar().forward_dynamics_derivatives(
         [0, 0], [0, 0], [0, 0]

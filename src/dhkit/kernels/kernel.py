@@ -346,6 +346,7 @@ def kernel(
     --------
     >>> import casadi
     >>> import numpy as np
+    >>> from dhkit.symbolic import Graph
     >>> p, x = casadi.SX.sym("p"), casadi.SX.sym("x")
     >>> program = Graph.of("scaled", {"parameters": p, "x": x}, {"y": p * x})
     >>> run = kernel("scaled", "", lambda: program)

@@ -14,7 +14,7 @@ INDEX = "index"
 """The source of an input that is the number of the item, from 0."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PipelineStep:
     """A straight-line program that is run for several items, in the lanes of vectors where there are more than one.
 
@@ -46,8 +46,14 @@ class PipelineStep:
         """The outputs that later steps can use."""
         return self.graph.outputs[:-1] if self.most > 1 else self.graph.outputs
 
+    def __repr__(self) -> str:
+        often = f", at most {counted(self.most, 'time')}" if self.most > 1 else ""
+        return repr_line(
+            f"PipelineStep {self.graph.name}", summary=f"{counted(self.items, 'item')}{often}"
+        )
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Pipeline:
     """Steps that are run one after the other.
 
