@@ -357,7 +357,7 @@ def test_the_compiled_elimination_finds_what_lapack_finds(name, law):
 def test_single_calls_find_what_batches_find(name, law):
     """A single pose is solved by a compiled function, or the ordinary way where two solutions nearly coincide."""
     arm = ALL[name]
-    q = np.random.default_rng(11).uniform(-np.pi, np.pi, (law.samples(20_000, quick=150), 6))
+    q = np.random.default_rng(11).uniform(-np.pi, np.pi, (law.samples(20_000, quick=80), 6))
     # Beside random states some near singularities, and poses that are not reached or none.
     q[::10, 4] = 1e-5
     T = arm.fk(q)
@@ -427,7 +427,7 @@ def test_of_nearly_spherical_wrists_no_solution_is_missed_in_silence(offset, law
     ]
     arm = Arm.from_dh(rows, name="offset")
     arm.compile()
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (law.samples(3_000, quick=100), 6))
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (law.samples(3_000, quick=40), 6))
     T = arm.fk(q)
     found = [arm.ik(pose_of_tool) for pose_of_tool in T]
     missed = np.array(

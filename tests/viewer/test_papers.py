@@ -48,7 +48,7 @@ def all_values():
     return values()
 
 
-@pytest.mark.parametrize("width", [60, 88, 130, 180])
+@pytest.mark.parametrize("width", [60, 88, 180])
 @pytest.mark.parametrize(
     "name", ["arm", "motion", "simulation", "controllers", "workspace", "ellipsoid"]
 )
