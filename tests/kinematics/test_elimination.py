@@ -384,7 +384,8 @@ def test_single_calls_find_what_batches_find(name, law):
             assert alone.status == batch.status[k] == "ok"
             assert (alone.flags == batch.flags[k, :count]).all()
         assert alone.branches == batch.branches[:count]
-    assert taken > 0.5 * len(T)
+    # Of three parallel axes with an offset wrist about half of the poses have roots that nearly coincide.
+    assert taken > 0.3 * len(T)
 
 
 def test_single_calls_leave_other_arguments_to_the_ordinary_way():
