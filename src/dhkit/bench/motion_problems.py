@@ -21,9 +21,9 @@ from dhkit.planning import Obstacle
 from dhkit.planning.obstacles.capsules import link_capsules
 from dhkit.trajectories import Trajectory
 
-RATE = 1000.0
+_RATE = 1000.0
 """Samples of a motion per second at which it is judged, Hz."""
-ROUNDING = 1e-6
+_ROUNDING = 1e-6
 """Shortfall of a distance, m, or excess of a limit, as a share of it, that counts as none."""
 MOTION_COLUMNS = ("arm", "motions found", "longest / known", "clearance left", "time", "why not")
 _SAME_SHAPE = 1e-9
@@ -182,17 +182,17 @@ class MotionProblems:
             ``"ends"``, rad and m; ``"clearance"``, m; ``"position"``, rad and m; ``"speed"`` and ``"torque"``, as
             shares of the limits.
         """
-        t = np.append(np.arange(0.0, motion.duration, 1 / RATE), motion.duration)
+        t = np.append(np.arange(0.0, motion.duration, 1 / _RATE), motion.duration)
         q, qd, qdd = motion.q(t), motion.qd(t), motion.qdd(t)
         tau = arm.inverse_dynamics(q, qd, qdd)
         ends = np.concatenate([q[0] - scene.start, q[-1] - scene.goal, qd[0], qd[-1]])
         gap = self.clearances(arm, q, scene.solids).min()
         return {
-            "ends": float(np.abs(ends).max()) - ROUNDING,
-            "clearance": self.clearance - float(gap) - ROUNDING,
-            "position": float(np.maximum(self.lower - q, q - self.upper).max()) - ROUNDING,
-            "speed": float((np.abs(qd) / self.speed).max()) - 1 - ROUNDING,
-            "torque": float((np.abs(tau) / self.torque).max()) - 1 - ROUNDING,
+            "ends": float(np.abs(ends).max()) - _ROUNDING,
+            "clearance": self.clearance - float(gap) - _ROUNDING,
+            "position": float(np.maximum(self.lower - q, q - self.upper).max()) - _ROUNDING,
+            "speed": float((np.abs(qd) / self.speed).max()) - 1 - _ROUNDING,
+            "torque": float((np.abs(tau) / self.torque).max()) - 1 - _ROUNDING,
         }
 
 
@@ -315,7 +315,7 @@ def plan_problems(problems: MotionProblems) -> MotionRow:
             continue
         found += 1
         longest = max(longest, motion.duration / scene.duration)
-        nearest = min(nearest, -faults["clearance"] - ROUNDING)
+        nearest = min(nearest, -faults["clearance"] - _ROUNDING)
     count = max(1, len(problems.scenes))
     return MotionRow(
         problems.robot,

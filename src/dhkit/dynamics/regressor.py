@@ -97,8 +97,7 @@ def regressor(
     >>> (Y @ inertial_parameters(arm)).round(4)  # without drives, these are the torques
     array([14.8616,  2.8382])
     """
-    named = ((q, "q"), (qd, "qd"), (qdd, "qdd"))
-    states = [joint_array(description, x, name) for x, name in named]
+    states = _states(description, q, qd, qdd)
     run, parameters = regressor_kernel(description)
     return fill(run, parameters, states, (description.n, 10 * description.n), out, threads)
 
@@ -157,8 +156,7 @@ def base_regressor(
     >>> (Y @ base_parameters(arm).values()).round(4)
     array([14.8616,  2.8382])
     """
-    named = ((q, "q"), (qd, "qd"), (qdd, "qdd"))
-    states = [joint_array(description, x, name) for x, name in named]
+    states = _states(description, q, qd, qdd)
     run, parameters = base_regressor_kernel(description)
     tail = (description.n, base_parameter_count(description))
     return fill(run, parameters, states, tail, out, threads)
@@ -181,6 +179,12 @@ def base_regressor_kernel(description: Description) -> tuple[Kernel, Array]:
     key = " ".join([pattern, *(f"{kind}{joints}" for kind, joints in columns)])
     run = kernel("base_regressor", key, lambda: _base_graph(description, columns))
     return run, np.concatenate([parameters, gravity_in_base(description)])
+
+
+def _states(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> list[Array]:
+    """Return joint values, rates and accelerations as arrays (..., n)."""
+    named = {"q": q, "qd": qd, "qdd": qdd}
+    return [joint_array(description, x, name) for name, x in named.items()]
 
 
 def _graph(description: Description) -> Graph:

@@ -50,12 +50,14 @@ class EliminatedPoseCall:
         )
 
     def _install(self, call: FastCall) -> None:
+        # What the function does not take goes the ordinary way, whose kernels small batches do not compile.
+        if call is not never:
+            for one in elimination_kernels(self._description):
+                one.compile()
         self._call = call
 
     def compile(self) -> None:
         """Compile the function now, and the kernels of the ordinary way."""
-        for one in elimination_kernels(self._description):
-            one.compile()
         if isinstance(self._call, SingleCall):
             self._call.compile()
 

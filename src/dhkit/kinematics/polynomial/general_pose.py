@@ -30,18 +30,20 @@ from dhkit.symbolic.programs.graph import Variable
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
-Line: TypeAlias = "tuple[_SX, _SX]"
+_Line: TypeAlias = "tuple[_SX, _SX]"
 """A point and the direction, 3 x 1 each."""
 
-EQUATIONS = 14
-FAR = 8
+_EQUATIONS = 14
+_FAR = 8
 """Number of products of cosines and sines of the two far joints, without 1."""
-WITHOUT = EQUATIONS - FAR
+_WITHOUT = _EQUATIONS - _FAR
 """Number of equations without the far joints."""
-NEAR = 9
+_NEAR = 9
 """Number of products of 1, cosines and sines of joints i + 1 and i + 2."""
-SIZES = (1, 12, 18, 18, 3 * EQUATIONS * NEAR, 12)
+_SIZES = (1, 12, 18, 18, 3 * _EQUATIONS * _NEAR, 12)
 """Numbers of parameters: see :class:`_Arm`."""
+_REFLECTIONS = sum(_EQUATIONS - k for k in range(_FAR))
+"""Number of entries of all vectors of reflections: each is one shorter than the one before."""
 _FIRST_ANGLE = 0.1
 """First angle at which the polynomial is evaluated, rad."""
 _POLISHING_STEPS = 2
@@ -71,9 +73,9 @@ class _Arm:
     @classmethod
     def read(cls, parameters: _SX, joint: int, is_reversed: bool) -> _Arm:
         """Return the parameters by name."""
-        ends = [sum(SIZES[:k]) for k in range(len(SIZES) + 1)]
+        ends = [sum(_SIZES[:k]) for k in range(len(_SIZES) + 1)]
         per_length, T, directions, points, near, _ = ca.vertsplit(parameters, ends)
-        size = EQUATIONS * NEAR
+        size = _EQUATIONS * _NEAR
         return cls(
             joint,
             is_reversed,
@@ -81,7 +83,7 @@ class _Arm:
             ca.reshape(T, 4, 3).T,
             ca.vertsplit(directions, 3),
             ca.vertsplit(points, 3),
-            [ca.reshape(x, NEAR, EQUATIONS).T for x in ca.vertsplit(near, size)],
+            [ca.reshape(x, _NEAR, _EQUATIONS).T for x in ca.vertsplit(near, size)],
         )
 
     @property
@@ -94,7 +96,7 @@ class _Arm:
         """Indices of the two joints that are eliminated."""
         return {1: (4, 5), 2: (5, 0), 3: (0, 1)}[self.joint]
 
-    def turned(self, place: int, cosine: _SX, sine: _SX, line: Line) -> Line:
+    def turned(self, place: int, cosine: _SX, sine: _SX, line: _Line) -> _Line:
         """Return a line turned about an axis."""
         R = _rotation(self.directions[place], cosine, sine)
         origin = self.points[place]
@@ -115,7 +117,7 @@ def pose_program(joint: int, is_reversed: bool) -> Pipeline:
     joint, is_reversed
         See :class:`dhkit.kinematics.polynomial.general.General`.
     """
-    parameters = ca.SX.sym("parameters", sum(SIZES))
+    parameters = ca.SX.sym("parameters", sum(_SIZES))
     arm = _Arm.read(parameters, joint, is_reversed)
     steps = (
         _prepared(parameters, arm),
@@ -127,7 +129,7 @@ def pose_program(joint: int, is_reversed: bool) -> Pipeline:
         *root_steps(parameters),
         _solutions(parameters, arm),
     )
-    inputs = (Variable("parameters", (sum(SIZES),)), Variable("T", (4, 4)))
+    inputs = (Variable("parameters", (sum(_SIZES),)), Variable("T", (4, 4)))
     return Pipeline("general_pose", inputs, steps, RESULTS)
 
 
@@ -178,22 +180,23 @@ def _far_side(parameters: _SX) -> PipelineStep:
 
     Q is a product of Householder's reflections 1 - w w^T, whose vectors w are the outputs.
     """
-    flat = ca.SX.sym("far_values", EQUATIONS * 9)
+    flat = ca.SX.sym("far_values", _EQUATIONS * 9)
     # Entry by entry, of all items.
-    values = ca.reshape(flat, 9, EQUATIONS)
+    values = ca.reshape(flat, 9, _EQUATIONS)
     side = _of_two_angles(values).T
     constant = side[:, 0]
-    A = [[side[row, column] for column in range(1, NEAR)] for row in range(EQUATIONS)]
+    A = [[side[row, column] for column in range(1, _NEAR)] for row in range(_EQUATIONS)]
     vectors = []
-    for k in range(FAR):
-        x = [A[row][k] for row in range(k, EQUATIONS)]
+    for k in range(_FAR):
+        # The reflection takes column k, from row k on, to (end, 0, ..., 0).
+        x = [A[row][k] for row in range(k, _EQUATIONS)]
         length = ca.sqrt(sum(entry * entry for entry in x))
         end = ca.if_else(x[0] > 0.0, -length, length)
         w = [x[0] - end, *x[1:]]
-        # |w|^2 = 2 |x| (|x| + |x_0|), and 2 of a vector of a reflection.
+        # |w|^2 = 2 |x| (|x| + |x_0|), and has to be 2.
         factor = 1.0 / (ca.sqrt(length * (length + ca.fabs(x[0]))) + _TINY)
         w = [entry * factor for entry in w]
-        for column in range(k, FAR):
+        for column in range(k, _FAR):
             along = sum(w[m] * A[k + m][column] for m in range(len(w)))
             for m in range(len(w)):
                 A[k + m][column] = A[k + m][column] - along * w[m]
@@ -201,7 +204,7 @@ def _far_side(parameters: _SX) -> PipelineStep:
     outputs = {
         "constant": constant,
         "reflections": ca.vertcat(*(entry for w in vectors for entry in w)),
-        "R": ca.vertcat(*(A[row][column] for row in range(FAR) for column in range(row, FAR))),
+        "R": ca.vertcat(*(A[row][column] for row in range(_FAR) for column in range(row, _FAR))),
     }
     graph = Graph.of("far_side", {"parameters": parameters, "far_values": flat}, outputs)
     return PipelineStep(graph, shared={"far_values": "far_values"})
@@ -236,13 +239,10 @@ def _read_reflections(flat: _SX) -> list[list[_SX]]:
     """Return the vectors of the reflections."""
     entries = ca.vertsplit(flat)
     vectors = []
-    for k in range(FAR):
-        vectors.append(entries[: EQUATIONS - k])
-        entries = entries[EQUATIONS - k :]
+    for k in range(_FAR):
+        vectors.append(entries[: _EQUATIONS - k])
+        entries = entries[_EQUATIONS - k :]
     return vectors
-
-
-_REFLECTIONS = sum(EQUATIONS - k for k in range(FAR))
 
 
 def _six_equations(parameters: _SX, arm: _Arm) -> PipelineStep:
@@ -252,10 +252,10 @@ def _six_equations(parameters: _SX, arm: _Arm) -> PipelineStep:
     """
     index = ca.SX.sym("index")
     reflections = ca.SX.sym("reflections", _REFLECTIONS)
-    constant = ca.SX.sym("constant", EQUATIONS)
+    constant = ca.SX.sym("constant", _EQUATIONS)
     # Column 8 + index of Q is the reflections of a unit vector, the last one first.
-    unit = [ca.SX(0.0)] * FAR
-    unit += [ca.if_else(index == float(k), 1.0, 0.0) for k in range(WITHOUT)]
+    unit = [ca.SX(0.0)] * _FAR
+    unit += [ca.if_else(index == float(k), 1.0, 0.0) for k in range(_WITHOUT)]
     null = ca.SX(ca.vertcat(*_reflected(_read_reflections(reflections)[::-1], unit)))
     factors: list[_SX] = [null.T @ side for side in arm.near]
     factors[0][0, 0] = factors[0][0, 0] - ca.dot(null, constant)
@@ -267,7 +267,7 @@ def _six_equations(parameters: _SX, arm: _Arm) -> PipelineStep:
     }
     return PipelineStep(
         Graph.of("six_equations", inputs, {"six": ca.SX(ca.horzcat(*factors))}),
-        items=WITHOUT,
+        items=_WITHOUT,
         each={"index": "index"},
         shared={"reflections": "reflections", "constant": "constant"},
     )
@@ -275,12 +275,12 @@ def _six_equations(parameters: _SX, arm: _Arm) -> PipelineStep:
 
 def _matrix(six: _SX, cosine: _SX, sine: _SX) -> list[list[_SX]]:
     """Return the matrix whose determinant is the polynomial, 12 rows of 12."""
-    factors = ca.SX(ca.reshape(six, WITHOUT, 3 * NEAR))
-    equations = factors[:, :NEAR] + cosine * factors[:, NEAR : 2 * NEAR]
-    equations = equations + sine * factors[:, 2 * NEAR :]
+    factors = ca.SX(ca.reshape(six, _WITHOUT, 3 * _NEAR))
+    equations = factors[:, :_NEAR] + cosine * factors[:, _NEAR : 2 * _NEAR]
+    equations = equations + sine * factors[:, 2 * _NEAR :]
     by_cosine = []
     by_sine = []
-    for row in range(WITHOUT):
+    for row in range(_WITHOUT):
         # With half = x / 2: cos x cos half = (cos 3 half + cos half) / 2, and so on.
         of_cosine = []
         of_sine = []
@@ -297,7 +297,7 @@ def _matrix(six: _SX, cosine: _SX, sine: _SX) -> list[list[_SX]]:
 
 def _determinants(parameters: _SX) -> PipelineStep:
     """Return the step with the determinants at equally spaced angles of joint i, and how far from singular they are."""
-    six = ca.SX.sym("six", WITHOUT * 3 * NEAR)
+    six = ca.SX.sym("six", _WITHOUT * 3 * _NEAR)
     index = ca.SX.sym("index")
     angle = _FIRST_ANGLE + index * (math.tau / SAMPLES)
     A, _, determinant = eliminated(_matrix(six, ca.cos(angle), ca.sin(angle)))
@@ -336,10 +336,10 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
     """Return the step from roots to solutions."""
     goal = ca.SX.sym("goal", 4, 4)
     motion = ca.SX.sym("motion", 3, 4)
-    six = ca.SX.sym("six", WITHOUT * 3 * NEAR)
+    six = ca.SX.sym("six", _WITHOUT * 3 * _NEAR)
     reflections = ca.SX.sym("reflections", _REFLECTIONS)
-    constant = ca.SX.sym("constant", EQUATIONS)
-    R = ca.SX.sym("R", FAR * (FAR + 1) // 2)
+    constant = ca.SX.sym("constant", _EQUATIONS)
+    R = ca.SX.sym("R", _FAR * (_FAR + 1) // 2)
     angle = ca.SX.sym("angle")
     of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "closeness")]
     is_tried, is_real, closeness = of_root
@@ -404,10 +404,10 @@ def _far_angles(right: _SX, reflections: _SX, R: _SX) -> tuple[_SX, _SX]:
     """Return the angles of the far joints from Q R p = right, p = (cos b, sin b, cos a, ..., sin a, ...)."""
     turned = _reflected(_read_reflections(reflections), ca.vertsplit(right))
     entries = iter(ca.vertsplit(R))
-    rows = [[next(entries) for _ in range(row, FAR)] for row in range(FAR)]
-    p: list[_SX] = [ca.SX(0.0)] * FAR
-    for k in reversed(range(FAR)):
-        rest = turned[k] - sum((rows[k][m - k] * p[m] for m in range(k + 1, FAR)), ca.SX(0.0))
+    rows = [[next(entries) for _ in range(row, _FAR)] for row in range(_FAR)]
+    p: list[_SX] = [ca.SX(0.0)] * _FAR
+    for k in reversed(range(_FAR)):
+        rest = turned[k] - sum((rows[k][m - k] * p[m] for m in range(k + 1, _FAR)), ca.SX(0.0))
         p[k] = rest / not_zero(rows[k][0])
     return ca.atan2(p[5], p[2]), ca.atan2(p[1], p[0])
 

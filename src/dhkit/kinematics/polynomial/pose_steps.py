@@ -138,7 +138,7 @@ def _better_estimates(parameters: _SX) -> PipelineStep:
 
 
 def _angles(parameters: _SX) -> PipelineStep:
-    """Return the step that tells which roots are real, and their angles of joint 1."""
+    """Return the step that tells which roots are real, and their angles."""
     numbers = ca.SX.sym("numbers", _COEFFICIENTS)
     error = ca.SX.sym("error")
     first = ca.SX.sym("first")
@@ -211,7 +211,7 @@ def known_solutions(
     of_complex = ca.if_else(is_real != 0.0, DOUBTFUL, NONE)
     one = ca.if_else(closeness > 0.0, NEAR_SOLUTION, SOLUTION)
     kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, one, DOUBTFUL), of_complex)
-    # Angles at -pi are those at pi.
+    # As dhkit.kinematics.eliminated.ordered has it. Angles at -pi are those at pi.
     around = [ca.if_else(q[k] < SAME_ANGLE - math.pi, q[k] + math.tau, q[k]) for k in range(3)]
     q_1, q_2, q_3 = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
     order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
