@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, islice
+from itertools import chain, groupby, islice
 
 from dhkit.kernels.lowering import SMALL_INTEGER, STORED, loop_values, result_values
 from dhkit.kernels.vectors import EXACT, FUSING, WIDTH, Body, Vector
@@ -13,8 +13,14 @@ from dhkit.symbolic import Graph, Loop
 
 BLOCK = 64
 """Largest number of items of a block: 8 vectors of 8 doubles."""
-_BLOCK_BYTES = 44 * 1024
-"""Largest size of a block of more than one vector, so that it fits into a first-level cache of 48 KB."""
+_BLOCK_BYTES = 16 * 1024
+"""Largest size of a block of more than one vector.
+
+A first-level cache, 32 KB or more, has to hold the block, the program's spilled registers and the arrays' lines.
+"""
+
+_SIZES = {"double": 8, "i8": 1}
+"""Size of an array's entry by LLVM's name of its type, bytes."""
 
 
 @dataclass(frozen=True)
@@ -166,9 +172,15 @@ def _broadcast(k: int) -> Iterator[str]:
     """Yield the lines that copy parameter K into all lanes of ``%pK``."""
     yield f"  %p{k}_at = getelementptr double, ptr %parameters, i64 {k}"
     yield f"  %p{k}_value = load double, ptr %p{k}_at"
-    vector = f"<{WIDTH} x double>"
-    yield f"  %p{k}_lane = insertelement {vector} poison, double %p{k}_value, i64 0"
-    yield f"  %p{k} = shufflevector {vector} %p{k}_lane, {vector} poison, <{WIDTH} x i32> zeroinitializer"
+    yield from _copies(f"%p{k}", f"%p{k}_value", "double", WIDTH)
+
+
+def _copies(name: str, value: str, kind: str, lanes: int) -> Iterator[str]:
+    """Yield the lines that copy a value into all lanes of the vector ``name``."""
+    vector = f"<{lanes} x {kind}>"
+    yield f"  {name}_lane = insertelement {vector} poison, {kind} {value}, i64 0"
+    shuffle = f"shufflevector {vector} {name}_lane, {vector} poison"
+    yield f"  {name} = {shuffle}, <{lanes} x i32> zeroinitializer"
 
 
 def _array(k: int, name: str) -> Iterator[str]:
@@ -230,20 +242,34 @@ def _copied(
     yield f"  %{label}_entries = getelementptr {kind}, ptr {array}, i64 %{label}_offset"
     yield f"  %{label}_column = getelementptr double, ptr %work, i64 %{label}_i"
     # array[(start + i) size + k] <-> work[row_k block + i] for item i of the block and entry k: a transposition.
-    for k, row in enumerate(rows):
+    for k, row, length in _runs(rows):
         outer = f"%{label}_outer{k}"
         inner = f"%{label}_inner{k}"
         value = f"%{label}_value{k}"
         yield f"  {outer} = getelementptr {kind}, ptr %{label}_entries, i64 {k}"
         yield f"  {inner} = getelementptr double, ptr %{label}_column, i64 {row * block}"
         yield f"  {value} = load double, ptr {outer if reading else inner}"
+        stored = kind
         if kind != "double":
             # In two steps, because the processor's instruction converts to 32 bits.
             yield f"  {value}_wide = fptosi double {value} to i32"
+            yield f"  {value}_whole = trunc i32 {value}_wide to {kind}"
             value = f"{value}_whole"
-            yield f"  {value} = trunc i32 %{label}_value{k}_wide to {kind}"
-        yield f"  store {kind} {value}, ptr {inner if reading else outer}"
+        if length > 1:
+            yield from _copies(f"{value}_copies", value, kind, length)
+            value = f"{value}_copies"
+            stored = f"<{length} x {kind}>"
+        yield f"  store {stored} {value}, ptr {inner if reading else outer}, align {_SIZES[kind]}"
     yield f"  %{label}_next = add i64 %{label}_i, 1"
     yield f"  %{label}_more = icmp slt i64 %{label}_next, %size"
     yield f"  br i1 %{label}_more, label %{label}, label %{label}_end"
     yield f"{label}_end:"
+
+
+def _runs(rows: Sequence[int]) -> Iterator[tuple[int, int, int]]:
+    """Yield the first entry, the row and the length of each run of entries that share a row."""
+    first = 0
+    for row, run in groupby(rows):
+        length = len(list(run))
+        yield first, row, length
+        first += length

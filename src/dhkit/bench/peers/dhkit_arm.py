@@ -36,6 +36,8 @@ NEAR_BY = 0.05
 """How far a start of numeric inverse kinematics is from a solution, each joint, rad and m."""
 FEW = (2, 8, 64)
 """Sizes of small batches."""
+_BLOCK = 1_000
+"""Number of states of a block, whose results are written over those of the block before."""
 
 
 def contenders() -> tuple[Contender, ...]:
@@ -43,6 +45,7 @@ def contenders() -> tuple[Contender, ...]:
     setups: tuple[tuple[str, Mode, Callable[[str], Callable[[Workload], Task]]], ...] = (
         (BATCH, Mode.BATCH, _into_out),
         (_NEW_ARRAYS, Mode.BATCH, _into_new_arrays),
+        (f"dhkit, blocks of {_BLOCK:,}, out=", Mode.BATCH, _in_blocks),
         (SINGLE, Mode.SINGLE, _single),
         (SINGLE_INTO_OUT, Mode.SINGLE, _single_into_out),
         *((f"dhkit, {size} a call", Mode.FEW, partial(_few, size)) for size in FEW),
@@ -95,6 +98,32 @@ def _into_out(quantity: str) -> Callable[[Workload], Task]:
             return lambda: function(*chosen, out=out, threads=workload.threads)
 
         return Task(prepare, lambda k: _answers(quantity, prepare(k)()))
+
+    return setup
+
+
+def _in_blocks(quantity: str) -> Callable[[Workload], Task]:
+    def setup(workload: Workload) -> Task:
+        function = method(workload.arm, quantity)
+        inputs = workload.inputs(quantity)
+        _refuse_open_form(workload, quantity)
+        out = new_output(function, [x[:_BLOCK] for x in inputs])
+
+        def prepare(items: int) -> Call:
+            starts = range(0, items, _BLOCK)
+            blocks = [[x[:items][start : start + _BLOCK] for x in inputs] for start in starts]
+
+            def loop() -> None:
+                for block in blocks:
+                    function(*block, out=out[: len(block[0])], threads=workload.threads)
+
+            return loop
+
+        def first_answers(wanted: int) -> list[Array]:
+            chosen = [x[: min(wanted, _BLOCK)] for x in inputs]
+            return _answers(quantity, function(*chosen, out=out[: len(chosen[0])]))
+
+        return Task(prepare, first_answers)
 
     return setup
 
