@@ -22,7 +22,7 @@ import acceptance
 from acceptance import DIFFERENT_ROBOTS, only_accepting, slow_if
 from dhkit import Arm, dynamics, kinematics
 from dhkit.kernels import single_calls
-from dhkit.kernels.call_source import MAX_ITEMS
+from dhkit.kernels.call_source import MAX_IN_LANES, MAX_ITEMS
 from dhkit.kinematics.programs import kinematic_kernels
 from random_arms import arms, tables
 
@@ -100,12 +100,15 @@ def test_values_are_those_of_the_ordinary_way(name, law):
             assert not all(joint.bodies for joint in arm.description.joints)
             continue
         fast = partial(stacked, fast)
-        for items in (None, 1, 2, 7, MAX_ITEMS):
+        for items in (None, 1, 2, 7, MAX_ITEMS, MAX_IN_LANES):
             shape = (arm.n,) if items is None else (items, arm.n)
             for _ in range(law.samples(200, quick=3)):
                 states = rng.normal(scale=rng.choice([1e-3, 1.0, 100.0]), size=(count, *shape))
                 expected = ordinary(method)(arm, *states)
                 found = fast(*states, None)
+                if found is None:
+                    assert items == MAX_IN_LANES and expected.nbytes > 4 << 20
+                    continue
                 assert found is not None and found.shape == expected.shape
                 assert found.flags.c_contiguous
                 scale = np.abs(expected).max(initial=1.0)
@@ -176,7 +179,17 @@ def unusual(rng, n, tmp_path):
     yield still
     unaligned = np.zeros(8 * n + 1, dtype=np.uint8)[1:].view(float)
     yield unaligned
-    for shape in ((), (0,), (n - 1,), (n + 1,), (0, n), (1, n), (MAX_ITEMS + 1, n), (2, 3, n)):
+    for shape in (
+        (),
+        (0,),
+        (n - 1,),
+        (n + 1,),
+        (0, n),
+        (1, n),
+        (MAX_ITEMS + 1, n),
+        (MAX_IN_LANES + 1, n),
+        (2, 3, n),
+    ):
         yield rng.normal(size=shape)
     for value in (np.nan, np.inf, -np.inf, 1e6, np.nextafter(1e6, 2e6), 1e300, 5e-324, -0.0):
         with_value = q.copy()
@@ -275,6 +288,21 @@ def test_a_result_may_lie_where_an_input_lies(puma):
                     assert np.allclose(out, expected, rtol=1e-9, atol=1e-9), (method, shift)
 
 
+def test_states_that_are_missing_in_a_batch_are_missing_in_the_result_alone(puma):
+    rng = np.random.default_rng(4)
+    for items in (5, 9, 100):
+        for method, count in STATES.items():
+            states = rng.normal(size=(count, items, puma.n))
+            states[-1, items // 2, 2] = np.nan
+            assert_same(
+                called(puma, method)(*states),
+                ordinary(method)(puma, *states),
+            )
+            rest = np.delete(states, items // 2, axis=1)
+            found = np.delete(called(puma, method)(*states), items // 2, axis=0)
+            assert np.array_equal(found, called(puma, method)(*rest)), method
+
+
 @pytest.mark.parametrize(
     "name",
     [slow_if(name != "planar2r", name) for name in ("planar2r", "puma560", "stanford", "panda")],
@@ -356,8 +384,11 @@ def test_threads_share_a_function(puma):
     expected = [[puma.fk(state) for state in states] for states in q]
     found = [None] * 8
 
+    batches = [None] * 8
+
     def work(k):
         found[k] = [puma.fk(state) for state in q[k]]
+        batches[k] = puma.fk(q[k])
 
     threads = [threading.Thread(target=work, args=(k,)) for k in range(8)]
     for thread in threads:
@@ -365,6 +396,7 @@ def test_threads_share_a_function(puma):
     for thread in threads:
         thread.join()
     assert np.array_equal(found, expected)
+    assert np.allclose(batches, expected, rtol=0, atol=1e-14)
 
 
 def test_calls_leave_no_memory_behind(puma, law):

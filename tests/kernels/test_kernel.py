@@ -17,7 +17,7 @@ from dhkit.description import library_robot, robots, world_to_tool
 from dhkit.errors import DhkitError
 from dhkit.kernels import Kernel, kernel, machine_code
 from dhkit.kernels.kernel import COMPILE_AFTER, MIN_ITEMS_PER_THREAD, SMALL_BATCH, kernel_mode
-from dhkit.kernels.llvm_source import BLOCK, llvm_source
+from dhkit.kernels.llvm_source import llvm_source, work_size
 from dhkit.kernels.threads import all_in_threads, in_threads
 from dhkit.kinematics import forward_kinematics, inverse_kinematics, jacobian
 from dhkit.symbolic import Graph, Loop
@@ -268,7 +268,7 @@ def test_with_one_tier_a_batch_is_its_items_bit_for_bit(name, mode, monkeypatch)
 
 def test_memory_beyond_results_is_one_block():
     """Scratch space does not grow with the batch: that of inverse kinematics fits the first cache."""
-    assert BLOCK * 8 * (17 + 48 + 18) < 48 * 1024
+    assert 8 * work_size(17 + 48 + 18) < 32 * 1024
 
 
 @pytest.mark.parametrize("processor", ["x86-64", "haswell", "skylake-avx512"])

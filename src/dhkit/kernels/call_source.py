@@ -1,7 +1,7 @@
 """A program as text of LLVM's intermediate representation of a C function that Python calls with arrays.
 
-It serves calls for one state or a few, whose cost is Python's: checking and converting arguments and allocating the
-result take twenty times as long as the program. Here they are loads and comparisons on NumPy's array struct.
+It serves calls for one state or a short batch, whose cost is Python's: checking and converting arguments and allocating
+the result take twenty times as long as the program. Here they are loads and comparisons on NumPy's array struct.
 """
 
 from __future__ import annotations
@@ -10,12 +10,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import prod
 
+from dhkit.kernels.llvm_source import work_size
 from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER
 from dhkit.kernels.scalar_source import run_source
-from dhkit.symbolic import Program
+from dhkit.symbolic import Graph, Program
 
 MAX_ITEMS = 64
-"""Largest number of items of a call; for larger batches, the vector kernel is faster."""
+"""Largest number of items of a call that computes them one after the other, or while it holds Python's lock."""
+MAX_IN_LANES = 1_024
+"""Largest number of items of a call that passes them to the vector kernel."""
+_FEWEST_IN_LANES = 4
+"""Smallest number of items for the vector kernel; fewer are faster one after the other."""
+_MOST_NEW_BYTES = 4 << 20
+"""Largest new result: the ordinary way uses the memory of larger ones again."""
 
 CONTEXT = (
     "array_type",
@@ -27,11 +34,15 @@ CONTEXT = (
     "PyTuple_Pack",
     "Py_IncRef",
     "Py_DecRef",
+    "PyEval_SaveThread",
+    "PyEval_RestoreThread",
+    "kernel",
 )
 """Addresses that the function reads from its context, the array that Python binds to it, in this order.
 
-The class ``numpy.ndarray``, the object of the type float64, ``None``, the arm's parameters, and functions of NumPy and
-Python. They differ between processes, so that machine code, which is kept on disk, contains none of them.
+The class ``numpy.ndarray``, the object of the type float64, ``None``, the arm's parameters, functions of NumPy and
+Python, and the vector kernel where :func:`takes_lanes`. They differ between processes, so that machine code, which is
+kept on disk, contains none of them.
 """
 
 # Byte offsets in NumPy's PyArrayObject_fields on 64-bit machines: ob_refcnt and ob_type of the object's header first.
@@ -130,15 +141,21 @@ def state_shapes(program: Program) -> list[tuple[int, ...]]:
     return [shape[:1] if shape[1:] == (1,) else shape for shape in shapes]
 
 
+def takes_lanes(program: Program) -> bool:
+    """Return whether a call of a program passes batches to the vector kernel."""
+    return isinstance(program, Graph) and len(program.outputs) == 1
+
+
 def call_source(
     program: Program, types: Sequence[str], tail: Sequence[int], *, refuses_nan: bool
 ) -> str:
     """Return a module with ``PyObject *call(PyObject *context, PyObject *const *arguments, Py_ssize_t count)``.
 
     The arguments are one array for each input after the parameters, and ``out`` or None. Taken are arrays of float64,
-    C-contiguous, of the inputs' shapes, or all with a batch axis of 1 to ``MAX_ITEMS`` items before it, and an ``out``
-    of the result's shape. The result is ``out`` or a new array; None of arguments that are not taken, which stay
-    unchanged. Results are NaN by the rule of :func:`dhkit.kernels.llvm_source.llvm_source`.
+    C-contiguous, of the inputs' shapes, or all with a batch axis of 1 to ``MAX_ITEMS`` items before it
+    (``MAX_IN_LANES`` where :func:`takes_lanes`), and an ``out`` of the result's shape. The result is ``out`` or a new
+    array; None of arguments that are not taken, which stay unchanged. Results are NaN by the rule of
+    :func:`dhkit.kernels.llvm_source.llvm_source`.
 
     Of a program with several outputs, the first one is that array, and the others are the content of a ``bytes``
     object, item after item. The result is the pair of both.
@@ -155,17 +172,20 @@ def call_source(
         Whether a result with an entry that is not finite counts as arguments that are not taken.
     """
     run = run_source(program, types, refuses_nan=refuses_nan)
-    return "\n".join([*run, *_call(program, types, tail), ""])
+    return "\n".join([*run, *_call(program, types, tail, refuses_nan), ""])
 
 
 _BYTES = {FLOAT: 8, SMALL_INTEGER: 1}
 """Sizes of an entry in bytes, by type."""
 
 
-def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[str]:
+def _call(
+    program: Program, types: Sequence[str], tail: Sequence[int], refuses_nan: bool
+) -> list[str]:
     """Return the lines of ``call``."""
     shapes = state_shapes(program)
     is_packing = len(types) > 1
+    in_lanes = takes_lanes(program)
     variables = list(zip(types[1:], program.outputs[1:], strict=True))
     item_bytes = 0
     function = _Function()
@@ -188,9 +208,9 @@ def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[s
     function.add(
         "%x0_first_size = load i64, ptr %x0_shape",
         "%items = select i1 %is_single, i64 1, i64 %x0_first_size",
-        # One comparison without sign for 1 <= items <= MAX_ITEMS.
+        # One comparison without sign for 1 <= items <= most.
         "%items_less_1 = sub i64 %items, 1",
-        f"%has_few_items = icmp ult i64 %items_less_1, {MAX_ITEMS}",
+        f"%has_few_items = icmp ult i64 %items_less_1, {MAX_IN_LANES if in_lanes else MAX_ITEMS}",
     )
     function.require("%has_few_items")
     for k, shape in enumerate(shapes):
@@ -217,6 +237,9 @@ def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[s
     function.add("call void %Py_IncRef(ptr %out)", "br label %compute")
 
     function.label("allocate")
+    most_new = _MOST_NEW_BYTES // (8 * max(1, prod(tail)))
+    function.add(f"%is_small = icmp ule i64 %items, {most_new}")
+    function.require("%is_small")
     function.add(
         f"%shape = alloca i64, i64 {len(tail) + 1}",
         "store i64 %items, ptr %shape",
@@ -227,11 +250,13 @@ def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[s
         f"%new = call ptr %PyArray_New(ptr %array_type, i32 %new_axes, ptr %new_shape, i32 {_FLOAT64},"
         " ptr null, ptr null, i32 0, i32 0, ptr null)",
         "%is_out_of_memory = icmp eq ptr %new, null",
-        "br i1 %is_out_of_memory, label %failed, label %compute",
+        "br i1 %is_out_of_memory, label %failed, label %new_array",
     )
+    function.label("new_array")
+    function.add("br label %compute")
 
     function.label("compute")
-    function.add("%array = phi ptr [%out, %use_out], [%new, %allocate]")
+    function.add("%array = phi ptr [%out, %use_out], [%new, %new_array]")
     function.load("y", "ptr", "%array", DATA_OFFSET)
     if is_packing:
         item_bytes = sum(_BYTES[kind] * variable.size for kind, variable in variables)
@@ -247,6 +272,8 @@ def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[s
         function.add(
             f"%packed = getelementptr i8, ptr %bytes, i64 {_BYTES_OFFSET}", "br label %first_item"
         )
+    elif in_lanes:
+        _compute_in_lanes(function, shapes, prod(tail), refuses_nan)
     else:
         function.add("br label %first_item")
     function.label("first_item")
@@ -313,6 +340,66 @@ def _call(program: Program, types: Sequence[str], tail: Sequence[int]) -> list[s
         *function.lines,
         "}",
     ]
+
+
+def _compute_in_lanes(
+    function: _Function, shapes: Sequence[Sequence[int]], size: int, refuses_nan: bool
+) -> None:
+    """Pass a batch of ``_FEWEST_IN_LANES`` items or more to the vector kernel; other items go to ``first_item``."""
+    pointers = [*(f"%x{k}_data" for k in range(len(shapes))), "%y"]
+    entries = sum(map(prod, shapes)) + size
+    function.add(
+        f"%is_batch = icmp uge i64 %items, {_FEWEST_IN_LANES}",
+        "br i1 %is_batch, label %in_lanes, label %first_item",
+    )
+    function.label("in_lanes")
+    function.add(
+        f"%arrays = alloca ptr, i64 {len(pointers)}",
+        f"%work = alloca double, i64 {work_size(entries)}, align 64",
+    )
+    for k, pointer in enumerate(pointers):
+        function.add(
+            f"%array{k} = getelementptr ptr, ptr %arrays, i64 {k}",
+            f"store ptr {pointer}, ptr %array{k}",
+        )
+    run = "call void %kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %items)"
+    function.add(
+        f"%is_long = icmp ugt i64 %items, {MAX_ITEMS}",
+        "br i1 %is_long, label %unlocked, label %locked",
+    )
+    function.label("locked")
+    function.add(run, "br label %computed_in_lanes")
+    # Other threads of Python run meanwhile, as in the ordinary way.
+    function.label("unlocked")
+    function.add(
+        "%thread = call ptr %PyEval_SaveThread()",
+        run,
+        "call void %PyEval_RestoreThread(ptr %thread)",
+        "br label %computed_in_lanes",
+    )
+    function.label("computed_in_lanes")
+    if not refuses_nan:
+        function.add("br label %finished")
+        return
+    # The sum of y - y is 0, or NaN where an entry is not finite.
+    function.add(f"%entries = mul i64 %items, {size}", "br label %entry_of_y")
+    function.label("entry_of_y")
+    function.add(
+        "%j = phi i64 [0, %computed_in_lanes], [%next_j, %entry_of_y]",
+        "%sum = phi double [0.0, %computed_in_lanes], [%next_sum, %entry_of_y]",
+        "%yj_at = getelementptr double, ptr %y, i64 %j",
+        "%yj = load double, ptr %yj_at",
+        "%difference = fsub double %yj, %yj",
+        "%next_sum = fadd double %sum, %difference",
+        "%next_j = add i64 %j, 1",
+        "%has_more_entries = icmp slt i64 %next_j, %entries",
+        "br i1 %has_more_entries, label %entry_of_y, label %looked_at",
+    )
+    function.label("looked_at")
+    function.add(
+        "%is_finite = fcmp oeq double %next_sum, 0.0",
+        "br i1 %is_finite, label %finished, label %refused",
+    )
 
 
 def _stored_sizes(tail: Sequence[int]) -> list[str]:

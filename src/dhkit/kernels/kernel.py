@@ -126,15 +126,16 @@ class Kernel:
         """Return whether a batch would be computed by machine code; counts and compiles as a call does."""
         return self._function_for(count) is not None
 
-    def compile(self) -> None:
-        """Load machine code from the cache or compile it now, unless ``DHKIT_KERNELS`` is ``off``."""
+    def compile(self) -> CompiledFunction | None:
+        """Return machine code from the cache, or compiled now; None if it fails or ``DHKIT_KERNELS`` is ``off``."""
         if kernel_mode() == "off":
-            return
+            return None
         with _compiling:
             if self._function is None and not self._failed:
                 self._look_up()
             if self._function is None and not self._failed:
                 self._compile()
+            return self._function
 
     def compiled_call(self, tail: tuple[int, ...], refuses_nan: bool) -> CompiledCall | None:
         """Return the program as a function for single calls, from the cache or compiled now; None if both fail.

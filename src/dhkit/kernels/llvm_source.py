@@ -11,7 +11,7 @@ from dhkit.kernels.lowering import SMALL_INTEGER, STORED, loop_values, result_va
 from dhkit.kernels.vectors import EXACT, FUSING, WIDTH, Body, Vector
 from dhkit.symbolic import Graph, Loop
 
-BLOCK = 64
+_BLOCK = 64
 """Largest number of items of a block: 8 vectors of 8 doubles."""
 _BLOCK_BYTES = 16 * 1024
 """Largest size of a block of more than one vector.
@@ -56,15 +56,21 @@ class _Layout:
         """Number of items of a block: its rows fill at most ``_BLOCK_BYTES``, in whole vectors."""
         rows = 1 + max(chain.from_iterable((*self.inputs, *self.outputs)))
         fitting = _BLOCK_BYTES // (8 * rows) // WIDTH * WIDTH
-        return max(WIDTH, min(fitting, BLOCK))
+        return max(WIDTH, min(fitting, _BLOCK))
+
+
+def work_size(columns: int) -> int:
+    """Return the size of a kernel's work array, in doubles, from the number of all its inputs' and outputs' columns."""
+    # A block has at most a row for each column; it is one vector wide, or fills at most _BLOCK_BYTES.
+    return max(WIDTH * columns, _BLOCK_BYTES // 8)
 
 
 def llvm_source(program: Graph | Loop, types: Sequence[str]) -> str:
     """Return a module with ``void kernel(double *parameters, void **arrays, double *work, int64 count)``.
 
     ``arrays`` holds the addresses of inputs, then outputs: (count, size) each, row by row. They are transposed block by
-    block in ``work`` (at most ``BLOCK`` doubles for each of their columns, aligned to 64 bytes), so that every load and
-    store of the program is of neighbouring items. Where an item's input is not finite, its float results are NaN.
+    block in ``work`` (of :func:`work_size` doubles, aligned to 64 bytes), so that every load and store of the program
+    is of neighbouring items. Where an item's input is not finite, its float results are NaN.
 
     Parameters
     ----------

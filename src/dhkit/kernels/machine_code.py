@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.kernels.llvm_source import BLOCK
+from dhkit.kernels.llvm_source import work_size
 from dhkit.kernels.stages import Stage, Stages, address, aligned
 
 _OPTIMIZATION = 2
@@ -26,7 +26,7 @@ _SIGNATURE = ctypes.CFUNCTYPE(
     None,
     ctypes.c_void_p,  # parameters: double[p]
     ctypes.c_void_p,  # arrays: addresses of the inputs and then the outputs, each [items][size]
-    ctypes.c_void_p,  # work: double[sum of sizes][BLOCK], where a block's inputs and outputs are transposed
+    ctypes.c_void_p,  # work: double[work_size], where a block's inputs and outputs are transposed
     ctypes.c_int64,  # number of items
 )
 """The C function ``void kernel(double *parameters, void **arrays, double *work, int64_t items)``."""
@@ -91,8 +91,8 @@ class CompiledFunction:
     """
 
     def __init__(self, code: bytes) -> None:
-        self._engine, place = _loaded(code, "kernel")
-        self._function = _SIGNATURE(place)
+        self._engine, self.address = _loaded(code, "kernel")
+        self._function = _SIGNATURE(self.address)
         self._few_items: Stages | None = None
         """Arrays for few items, made at the first call."""
 
@@ -142,7 +142,7 @@ class CompiledFunction:
         The machine code knows addresses alone: the bound function keeps the arrays alive, also the work array that no
         other object refers to.
         """
-        work = aligned(sum(array.shape[1] for array in arrays) * BLOCK, _ALIGNMENT)
+        work = aligned(work_size(sum(array.shape[1] for array in arrays)), _ALIGNMENT)
         addresses = np.array([address(array) for array in arrays], dtype=np.uintp)
         arguments = (address(parameters), address(addresses), address(work), len(arrays[0]))
         kept = (parameters, arrays, addresses, work)

@@ -1,6 +1,6 @@
-"""Calls for one state or a few, in a fraction of a microsecond: a program as a built-in function of Python.
+"""Calls for one state or a short batch, in a fraction of a microsecond: a program as a built-in function of Python.
 
-A kernel's ordinary way spends 6 to 10 microseconds on checking, converting and allocating arrays. The function here is
+A kernel's ordinary way spends 6 to 20 microseconds on checking, converting and allocating arrays. The function here is
 machine code with CPython's own signature (``METH_FASTCALL``), see :mod:`dhkit.kernels.call_source`. It answers None for
 whatever it does not take (lists, other types and layouts, large batches, errors), and the caller goes the ordinary way.
 It is made after ``CALLS_BEFORE_COMPILING`` calls, in a thread, so that no call waits for it.
@@ -32,12 +32,13 @@ from dhkit.kernels.call_source import (
     SHAPE_OFFSET,
     TYPE_OFFSET,
     state_shapes,
+    takes_lanes,
 )
 from dhkit.kernels.kernel import Kernel, compiling
 from dhkit.symbolic import Program
 
 if TYPE_CHECKING:
-    from dhkit.kernels.machine_code import CompiledCall
+    from dhkit.kernels.machine_code import CompiledCall, CompiledFunction
 
 log = logging.getLogger(__name__)
 
@@ -50,6 +51,8 @@ _NEW_ARRAY = 93
 """Indices in NumPy's C interface: ``PyArray_GetNDArrayCVersion``, ``PyArray_Type`` and ``PyArray_New``."""
 _AGREEMENT = 1e-9
 """Largest difference from the ordinary way at which a new function is used, relative to the largest entry."""
+_SEVERAL = 9
+"""Number of items at which the vector kernel behind a new function is compared: more than one vector."""
 
 FastCall: TypeAlias = Callable[..., Any]
 """Takes the states and ``out`` or None; returns the result, or None of arguments that it does not take.
@@ -132,7 +135,12 @@ class SingleCall:
         code = self._kernel.compiled_call(self._tail, self._refuses_nan)
         if code is None:
             return never
-        function = _bound(code, self._parameters)
+        lanes = None
+        if takes_lanes(self._kernel.program()):
+            lanes = self._kernel.compile()
+            if lanes is None:
+                return never
+        function = _bound(code, lanes, self._parameters)
         if not self._agrees(function):
             log.warning(
                 "%s: the function for single calls differs from the ordinary way, and is not used",
@@ -156,7 +164,9 @@ class SingleCall:
         if found is None:
             return self._refuses_nan and not np.isfinite(expected[0]).all()
         if len(expected) == 1:
-            return _are_near([found], expected)
+            batch = [np.repeat(state[None], _SEVERAL, axis=0) for state in states]
+            many = function(*batch, None)
+            return many is not None and all(_are_near([one], expected) for one in (found, *many))
         array, packed = found
         return _are_near([array, *unpacked(packed, graph, self._kernel.types)], expected)
 
@@ -225,8 +235,8 @@ class _Owner:
         self.kept = (addresses, *kept)
 
 
-def _bound(code: CompiledCall, parameters: Array) -> FastCall:
-    """Return machine code as a built-in function with these parameters.
+def _bound(code: CompiledCall, lanes: CompiledFunction | None, parameters: Array) -> FastCall:
+    """Return machine code as a built-in function with these parameters, and with the kernel that it passes batches to.
 
     The function refers to its context, which is a plain array, and the array to its owner. The cycle collector does not
     follow arrays: while the function lives, it cannot clear what the function needs, the method's definition included.
@@ -239,12 +249,13 @@ def _bound(code: CompiledCall, parameters: Array) -> FastCall:
             id(None),
             numbers.ctypes.data,
             _numpy_interface()[_NEW_ARRAY],
-            *map(_python_function, CONTEXT[5:]),
+            *map(_python_function, CONTEXT[5:-1]),
+            0 if lanes is None else lanes.address,
         ],
         dtype=np.uintp,
     )
     definition = _MethodDefinition(b"single_call", code.address, _METH_FASTCALL, b"")
-    context = np.asarray(_Owner(addresses, code, definition, numbers))
+    context = np.asarray(_Owner(addresses, code, lanes, definition, numbers))
     make = ctypes.pythonapi.PyCFunction_NewEx
     make.restype = ctypes.py_object
     make.argtypes = [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]
