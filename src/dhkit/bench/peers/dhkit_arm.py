@@ -121,7 +121,7 @@ def _in_blocks(quantity: str) -> Callable[[Workload], Task]:
 
         def first_answers(wanted: int) -> list[Array]:
             chosen = [x[: min(wanted, _BLOCK)] for x in inputs]
-            return _answers(quantity, function(*chosen, out=out[: len(chosen[0])]))
+            return list(_answers(quantity, function(*chosen, out=out[: len(chosen[0])])))
 
         return Task(prepare, first_answers)
 
