@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 from typing import Literal, TypeAlias
 
@@ -228,6 +229,11 @@ def freedoms(description: Description, motion: Motion = "translational") -> int:
     >>> freedoms(library_robot("planar3r")), freedoms(library_robot("planar3r"), "whole")
     (2, 3)
     """
+    return _freedoms(description, motion)
+
+
+@lru_cache(maxsize=256)
+def _freedoms(description: Description, motion: Motion) -> int:
     q = np.random.default_rng(0).uniform(0.3, 1.2, (_RANK_SAMPLES, description.n))
     sigma = singular_values(description, q, motion)
     return int(np.sum(sigma > _RANK_TOLERANCE * sigma.max(initial=0.0), axis=-1).max())
