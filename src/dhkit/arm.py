@@ -868,6 +868,42 @@ class Arm:
 
         return inverse_kinematics(self._description, T, seed, out, threads, redundancy, prefer)
 
+    def nearest_pose(self, T: ArrayLike) -> Array:
+        """Return the nearest pose that an arm of five joints reaches: the same position, turned by the least angle.
+
+        Joint limits are not regarded. :meth:`ik` solves the result.
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (..., 4, 4), m.
+
+        Returns
+        -------
+        Array
+            Shape (..., 4, 4), m; NaN where the position is out of reach, or T is no pose.
+
+        Raises
+        ------
+        ModelError
+            The arm is not a turntable with three parallel axes and a last one across them.
+        ValueError, TypeError
+            T has not shape (..., 4, 4), or is not numeric.
+
+        Examples
+        --------
+        >>> rows = [[0, 349, 16, -90], [0, 0, 221, 0], [0, 0, 221, 0], [90, 0, 0, 90], [0, 145, 0, 0]]
+        >>> scorbot = Arm.from_dh(rows, length="mm", angle="deg")
+        >>> T = [[0, 0, 1, 0.3], [0, 1, 0, 0.2], [-1, 0, 0, 0.4], [0, 0, 0, 1]]
+        >>> scorbot.ik(T).status.item()
+        'out_of_reach'
+        >>> scorbot.ik(scorbot.nearest_pose(T)).status.item()
+        'ok'
+        """
+        from dhkit.kinematics import nearest_pose
+
+        return nearest_pose(self._description, T)
+
     def redundancy(self, q: ArrayLike) -> Array:
         """Return the redundancy of joint values of an arm of seven joints.
 

@@ -193,11 +193,26 @@ def one_pose(T: ArrayLike, name: str = "T") -> Array:
 
 
 def inverse_pose(T: Array) -> Array:
-    """Return the inverse of one rigid transform (R, p), T (4, 4), m, shape (4, 4): (R^T, -R^T p)."""
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    """Return the inverses of rigid transforms (R, p), T (..., 4, 4), m: (R^T, -R^T p)."""
+    inverse = np.zeros_like(T)
+    inverse[..., :3, :3] = np.swapaxes(T[..., :3, :3], -1, -2)
+    inverse[..., :3, 3] = -(inverse[..., :3, :3] @ T[..., :3, 3, None])[..., 0]
+    inverse[..., 3, 3] = 1.0
     return inverse
+
+
+def turned_about(axis: Array, angles: Array) -> Array:
+    """Return the rotations about a unit vector (3,) by angles (...), rad, shape (..., 3, 3).
+
+    R = n n^T + cos (1 - n n^T) + sin [n].
+    """
+    along = np.outer(axis, axis)
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    c = np.cos(angles)[..., None, None]
+    s = np.sin(angles)[..., None, None]
+    rotations: Array = along + c * (np.eye(3) - along) + s * across
+    return rotations
 
 
 def _array(name: str, value: ArrayLike, size: int) -> Array:

@@ -16,6 +16,7 @@ from dhkit.kinematics.manipulability import (
     singular_values,
     velocity_ellipsoid,
 )
+from dhkit.kinematics.nearest import nearest_pose
 from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
 from dhkit.kinematics.preference import Preference
@@ -66,6 +67,7 @@ __all__ = [
     "kinematic_kernels",
     "manipulability",
     "measures",
+    "nearest_pose",
     "redundancy_intervals",
     "redundancy_of",
     "singular_configurations",

@@ -24,7 +24,7 @@ from dhkit.description import (
 )
 from dhkit.description.arrays import number_array
 from dhkit.description.frames import carrying
-from dhkit.description.poses import inverse_pose
+from dhkit.description.poses import inverse_pose, turned_about
 from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, Kernel, pose_rows
 from dhkit.kinematics.axes import Axes
@@ -493,14 +493,9 @@ def _values_to_try(description: Description) -> Array:
 def _turned(direction: Array, point: Array, angle: Array) -> Array:
     """Return the motions that turn about an axis by angles (...), shape (..., 4, 4).
 
-    A point x moves to p + R (x - p), R = n n^T + cos (1 - n n^T) + sin [n].
+    A point x moves to p + R (x - p).
     """
-    along = np.outer(direction, direction)
-    x, y, z = direction
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    c = np.cos(angle)[..., None, None]
-    s = np.sin(angle)[..., None, None]
-    R = along + c * (np.eye(3) - along) + s * across
+    R = turned_about(direction, angle)
     motion = np.zeros((*np.shape(angle), 4, 4))
     motion[..., :3, :3] = R
     motion[..., :3, 3] = point - R @ point

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description
-from dhkit.description.poses import inverse_pose
+from dhkit.description.poses import inverse_pose, turned_about
 from dhkit.kernels import Kernel, kernel
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import tool_kernel
@@ -237,8 +237,8 @@ class General:
             q[:, place] = angle
 
         # E_i E_(i+1) E_(i+2) E_(i+3) = E_(i-1)^-1 ... M ... E_(i+4)^-1.
-        before = [self._rotations(k, q[:, k]) for k in range(i + 3)]
-        after = [self._rotations(k, q[:, k]) for k in range(i + 4, 6)]
+        before = [turned_about(self.directions[k], q[:, k]) for k in range(i + 3)]
+        after = [turned_about(self.directions[k], q[:, k]) for k in range(i + 4, 6)]
         rest = np.swapaxes(_product(before, len(q)), 1, 2) @ motions[:, :3, :3]
         rest = rest @ np.swapaxes(_product(after, len(q)), 1, 2)
         axis = self.directions[i + 3]
@@ -257,7 +257,7 @@ class General:
         """Return M, the motions from zero joint positions to poses (N, 16) in the world, shape (N, 4, 4)."""
         M = poses.reshape(-1, 4, 4) @ self.T_tool_world
         M[:, :3, 3] /= self.newton.length
-        return inverse_poses(M) if self.is_reversed else M
+        return inverse_pose(M) if self.is_reversed else M
 
     @cached_property
     def _phase(self) -> complex:
@@ -331,28 +331,9 @@ class General:
         self, place: int, angle: float, point: Array, direction: Array
     ) -> tuple[Array, Array]:
         """Return points and directions (..., 3) turned about an axis."""
-        R = self._rotations(place, np.array([angle]))[0]
+        R = turned_about(self.directions[place], np.array(angle))
         origin = self.points[place]
         return origin + (point - origin) @ R.T, direction @ R.T
-
-    def _rotations(self, place: int, angle: Array) -> Array:
-        """Return rotations about an axis by angles (N,), shape (N, 3, 3)."""
-        axis = self.directions[place]
-        along = np.outer(axis, axis)
-        c = np.cos(angle)[:, None, None]
-        s = np.sin(angle)[:, None, None]
-        rotations: Array = along + c * (np.eye(3) - along) + s * _cross(axis)
-        return rotations
-
-
-def inverse_poses(T: Array) -> Array:
-    """Return the inverses of poses (N, 4, 4)."""
-    inverse = np.zeros_like(T)
-    R = np.swapaxes(T[:, :3, :3], 1, 2)
-    inverse[:, :3, :3] = R
-    inverse[:, :3, 3] = -np.einsum("nij,nj->ni", R, T[:, :3, 3])
-    inverse[:, 3, 3] = 1.0
-    return inverse
 
 
 def _equations(point: Array, direction: Array) -> Array:

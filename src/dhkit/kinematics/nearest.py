@@ -1,0 +1,226 @@
+"""The pose nearest to a wanted one that an arm of five joints reaches: the same position, turned by the least angle.
+
+Axis 5 stays in a plane that joint 1 turns (:mod:`dhkit.kinematics.closed_form.five_joints`). For a position of the
+tool there are two shoulders, and for each a surface of rotations, by the angle rho of axis 5 in the plane and by q5:
+
+    R(q1, rho, q5) = Rot(u, q1) Rot(v, rho) Rot(d, q5) R_0,
+
+with axis 1 along u, axes 2 to 4 along v, and axis 5 along d at zero joint values. q1 follows from q5: the tool's origin
+lies beside the plane by s(q5). At a given q5 the best rho is known in closed form; q5 is searched for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, takes_robot
+from dhkit.description.poses import turned_about
+from dhkit.errors import ModelError
+from dhkit.kernels import pose_rows
+from dhkit.kinematics.axes import Axes
+from dhkit.kinematics.candidates import are_poses, orthonormal
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.arm_plane import ArmPlane
+from dhkit.kinematics.closed_form.five_joints import five_joints_fit
+
+_SAMPLES = 128
+"""Values of q5 around the circle at which the search begins."""
+_PARTS = 16
+"""Parts into which the interval around the best value is divided again and again."""
+_TIMES = 9
+"""Number of divisions: the interval of 4 pi / 128 shrinks by 8 each time, to 1e-9 rad."""
+_GAIN = 0.3
+"""By how much the trace of a rotation between two samples may be larger than at both."""
+_OUT_OF_REACH = -5.0
+"""Value below those of all traces of rotations, which are -1 to 3."""
+_ROUNDING = 1e-12
+"""Share of the reach by which a position may be out of reach by rounding."""
+_U = np.array([0.0, 1.0, 0.0])
+_V = np.array([0.0, 0.0, 1.0])
+"""Directions u and v in the frame (x, u, v)."""
+_TOGETHER = 256
+"""Poses that are searched together, some 40 MB."""
+
+
+@takes_robot
+def nearest_pose(description: Description, T: ArrayLike) -> Array:
+    """Return the nearest pose that an arm of five joints reaches: the same position, turned by the least angle.
+
+    Joint limits are not regarded. The angle is the least to 1e-7 rad.
+
+    Parameters
+    ----------
+    description
+        The robot: a turntable, three parallel axes, and a last axis that rolls the tool, such as SO-101 or ScorBot.
+    T
+        Poses of the tool in the world, shape (..., 4, 4), m.
+
+    Returns
+    -------
+    Array
+        Shape (..., 4, 4), m; NaN where the position is out of reach, or T is no pose.
+
+    Raises
+    ------
+    ModelError
+        Another arm.
+    ValueError, TypeError
+        T has not shape (..., 4, 4), or is not numeric.
+
+    Examples
+    --------
+    >>> from dhkit import Arm
+    >>> rows = [[0, 349, 16, -90], [0, 0, 221, 0], [0, 0, 221, 0], [90, 0, 0, 90], [0, 145, 0, 0]]
+    >>> scorbot = Arm.from_dh(rows, length="mm", angle="deg")
+    >>> T = np.array([[0, 0, 1, 0.3], [0, 1, 0, 0.2], [-1, 0, 0, 0.4], [0, 0, 0, 1]])
+    >>> nearest_pose(scorbot, T)[:3, 2].round(3).tolist()
+    [0.832, 0.555, 0.0]
+    """
+    arm = _Plane.of(description)
+    poses = pose_rows(T)
+    rows = poses.reshape(-1, 4, 4)
+    posed = np.flatnonzero(are_poses(rows))
+    nearest = np.full(rows.shape, np.nan)
+    for begin in range(0, len(posed), _TOGETHER):
+        some = posed[begin : begin + _TOGETHER]
+        nearest[some] = arm.nearest(orthonormal(rows[some]))
+    return nearest.reshape(poses.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """An arm of five joints in the frame (x, u, v) of its plane at zero joint values."""
+
+    R: Array
+    """Directions x, u and v in the world, one a row, shape (3, 3)."""
+    t: Array
+    """The world's origin in this frame, shape (3,), m."""
+    R_0: Array
+    """Rotation of the tool at zero joint values, shape (3, 3)."""
+    d: Array
+    """Direction of axis 5 at zero joint values, shape (3,)."""
+    arm: Array
+    """From axis 5 to the tool's origin, across the axis, at zero joint values, shape (3,), m."""
+    foot: Array
+    """From axis 4 to the point of axis 5 next to the tool's origin, in the plane; and its v coordinate; (3,), m."""
+    a1: float
+    """Distance of axis 2 from axis 1 along x, m."""
+    reach: tuple[float, float]
+    """Least and largest distance of axis 4 from axis 2, m."""
+
+    @classmethod
+    @lru_cache(maxsize=64)
+    def of(cls, description: Description) -> _Plane:
+        """Return an arm's plane; raise ModelError for arms of another kind."""
+        axes = Axes.of(description)
+        fit = five_joints_fit(axes)
+        if fit is None:
+            words = classify(description).words
+            raise ModelError(
+                f"{description.name} is {words}; nearest_pose is for a turntable, three parallel axes and a last one"
+                " across them"
+            )
+        p = {name: np.asarray(value, dtype=float) for name, value in fit.parameters.items()}
+        R = ArmPlane.of(axes).R
+        R_0 = R @ axes.T_world_tool[:3, :3]
+        L2, L3 = float(p["L2"]), float(p["L3"])
+        return cls(
+            R=R,
+            t=p["T_plane_world"][:3, 3],
+            R_0=R_0,
+            d=R_0 @ p["axis"],
+            arm=-R_0 @ p["foot"],
+            foot=np.array([*p["lever"], float(p["offset"])]),
+            a1=float(p["a1"]),
+            reach=(abs(L2 - L3), L2 + L3),
+        )
+
+    def nearest(self, T: Array) -> Array:
+        """Return the nearest poses of poses (N, 4, 4), NaN where the position is out of reach."""
+        R = self.R @ T[:, :3, :3]
+        p = T[:, :3, 3] @ self.R.T + self.t
+        q5 = np.linspace(-np.pi, np.pi, _SAMPLES, endpoint=False)
+        value, _ = self._best(R, p, np.broadcast_to(q5, (len(T), _SAMPLES)))
+        # Every peak among the samples that may become the highest.
+        is_peak = (value >= np.roll(value, 1, axis=1)) & (value >= np.roll(value, -1, axis=1))
+        is_high = value >= value.max(axis=1, keepdims=True) - _GAIN
+        owner, place = np.nonzero(is_peak & is_high)
+        centre = q5[place]
+        step = 2 * np.pi / _SAMPLES
+        shares = np.linspace(-1.0, 1.0, _PARTS + 1)
+        row = np.arange(len(owner))
+        for _ in range(_TIMES):
+            tried = centre[:, None] + step * shares
+            value, turned = self._best(R[owner], p[owner], tried)
+            best = value.argmax(axis=-1)
+            centre = tried[row, best]
+            step *= 2 / _PARTS
+        height = value[row, best]
+        # The highest peak of each pose is its last one in this order.
+        order = np.lexsort([height, owner])
+        last = order[np.append(np.flatnonzero(np.diff(owner[order])), len(order) - 1)]
+        nearest = T.copy()
+        nearest[:, :3, :3] = self.R.T @ turned[last, best[last]]
+        nearest[height[last] < _OUT_OF_REACH] = np.nan
+        return nearest
+
+    def _best(self, R: Array, p: Array, q5: Array) -> tuple[Array, Array]:
+        """Return the best rotations (N, k, 3, 3) at values (N, k) of joint 5, and trace(R^T rotation), (N, k).
+
+        Where the position is out of reach, the trace is below ``_OUT_OF_REACH``, by how far it is.
+        """
+        roll = turned_about(self.d, q5)
+        lever = roll @ self.arm + self.foot
+        rolled = roll @ self.R_0
+        # Joint 1 turns (x + i s) to e^(-i q1) (x + i s), which is the position's part across axis 1.
+        s = lever[..., 2]
+        square = (p[:, 0] ** 2 + p[:, 2] ** 2)[:, None] - s**2
+        beside = np.maximum(-square, 0.0) / self.reach[1] ** 2
+        x = np.sqrt(np.maximum(square, 0.0))
+        best = np.full(q5.shape, -np.inf)
+        turned = np.full((*q5.shape, 3, 3), np.nan)
+        for side in (x, -x):
+            q1 = np.arctan2(s, side) - np.arctan2(p[:, 2], p[:, 0])[:, None]
+            turn = turned_about(_U, q1)
+            # trace(R^T turn Rot(v, rho) rolled) = trace(Rot(v, rho) B).
+            B = rolled @ np.swapaxes(R, -1, -2)[:, None] @ turn
+            along = B[..., 0, 0] + B[..., 1, 1]
+            across = B[..., 0, 1] - B[..., 1, 0]
+            to_axis_2 = np.stack(
+                [side - self.a1, np.broadcast_to(p[:, 1, None], side.shape)], axis=-1
+            )
+            rho, missed = self._angle(np.arctan2(across, along), to_axis_2, lever[..., :2])
+            missed = missed + beside
+            trace = B[..., 2, 2] + np.cos(rho) * along + np.sin(rho) * across
+            value = np.where(missed > _ROUNDING, 2 * _OUT_OF_REACH - missed, trace)
+            is_better = value > best
+            best = np.where(is_better, value, best)
+            pitched = turn @ turned_about(_V, rho) @ rolled
+            turned = np.where(is_better[..., None, None], pitched, turned)
+        return best, turned
+
+    def _angle(self, wanted: Array, tool: Array, lever: Array) -> tuple[Array, Array]:
+        """Return the angles nearest to the wanted ones (...) at which two links reach axis 4, and how far they miss it.
+
+        Axis 4 is at tool - e^(i rho) lever from axis 2, both (..., 2):
+
+            |axis 4|^2 = |tool|^2 + |lever|^2 - 2 |tool| |lever| cos(rho - middle).
+        """
+        middle = np.arctan2(tool[..., 1], tool[..., 0]) - np.arctan2(lever[..., 1], lever[..., 0])
+        squares = (tool**2).sum(axis=-1) + (lever**2).sum(axis=-1)
+        product = 2 * np.linalg.norm(tool, axis=-1) * np.linalg.norm(lever, axis=-1)
+        least, most = self.reach
+        # By how much |axis 4|^2 is too large or too small at any angle, over the reach squared.
+        excess = np.maximum(squares - product - most**2, least**2 - squares - product)
+        missed = np.maximum(excess, 0.0) / most**2
+        # The cosine is at least (squares - most^2) / product, so that |rho - middle| is between two angles of [0, pi].
+        room = np.maximum(product, np.finfo(float).tiny)
+        near = np.arccos(np.clip((squares - least**2) / room, -1.0, 1.0))
+        far = np.arccos(np.clip((squares - most**2) / room, -1.0, 1.0))
+        gap = np.remainder(wanted - middle + np.pi, 2 * np.pi) - np.pi
+        rho: Array = middle + np.copysign(np.clip(np.abs(gap), near, far), gap)
+        return rho, missed

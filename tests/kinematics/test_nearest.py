@@ -1,0 +1,95 @@
+"""The nearest pose of arms of five joints: reached, at the wanted position, and turned by the least angle."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from dhkit import Arm
+from dhkit.errors import ModelError
+from kinematics.closed_form.test_five_joints import ARMS, random_states
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+def turned(T, seed):
+    """Return poses at the same positions with random rotations."""
+    poses = T.copy()
+    poses[:, :3, :3] = Rotation.random(len(T), random_state=seed).as_matrix()
+    return poses
+
+
+def angles_between(A, B):
+    return Rotation.from_matrix(np.swapaxes(A[..., :3, :3], -1, -2) @ B[..., :3, :3]).magnitude()
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", ARMS)
+def test_a_pose_that_is_reached_is_its_own_nearest(name, law):
+    arm = ARMS[name]
+    T = arm.fk(random_states(law.samples(20_000, 500)))
+    found = arm.nearest_pose(T)
+    law.holds("distance", np.abs(found - T).max(), 1e-6, name)
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", ARMS)
+def test_the_nearest_pose_is_reached_at_the_wanted_position(name, law):
+    arm = ARMS[name]
+    T = turned(arm.fk(random_states(law.samples(20_000, 300), seed=1)), seed=2)
+    found = arm.nearest_pose(T)
+    assert np.array_equal(found[:, :3, 3], T[:, :3, 3])
+    solutions = arm.ik(found)
+    assert set(np.unique(solutions.status)) <= {"ok", "singular"}
+    q = solutions.q[np.arange(len(T)), solutions.valid.argmax(axis=-1)]
+    law.holds("closure", np.abs(arm.fk(q) - found).max(), 1e-8, name)
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", ARMS)
+def test_no_other_joint_values_come_nearer(name, law):
+    arm = ARMS[name]
+    rng = np.random.default_rng(3)
+    T = turned(arm.fk(random_states(law.samples(20, 2), seed=4)), seed=5)
+    found = arm.nearest_pose(T)
+    for goal, angle in zip(T, angles_between(T, found), strict=True):
+        least = np.inf
+        for _ in range(25):
+            result = minimize(
+                lambda q, R=goal[:3, :3]: -np.trace(R.T @ arm.fk(q)[:3, :3]),
+                rng.uniform(-np.pi, np.pi, 5),
+                constraints={"type": "eq", "fun": lambda q, p=goal[:3, 3]: arm.fk(q)[:3, 3] - p},
+                method="SLSQP",
+                options={"maxiter": 300, "ftol": 1e-12},
+            )
+            reached = arm.fk(result.x)
+            if np.abs(reached[:3, 3] - goal[:3, 3]).max() < 1e-8:
+                least = min(least, float(angles_between(goal, reached)))
+        law.holds("angle above that of a search", angle - least, 1e-5, name)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_position_is_out_of_reach_where_no_joint_values_reach_it(name):
+    arm = ARMS[name]
+    q = random_states(40, seed=6)
+    q[:, 2] *= 0.02
+    stretched = arm.fk(q)[:, :3, 3]
+    centre = arm.fk(np.zeros((1, 5)))[0, :3, 3] * [0.0, 0.0, 1.0]
+    T = np.tile(np.eye(4), (40, 1, 1))
+    T[:, :3, 3] = centre + (stretched - centre) * np.linspace(0.9, 1.2, 40)[:, None]
+    is_reached = np.isfinite(arm.nearest_pose(T)).all(axis=(1, 2))
+    expected = arm.ik_numeric(T, position_only=True, limits=False, restarts=50).valid.any(axis=-1)
+    assert np.array_equal(is_reached, expected)
+    assert 0 < is_reached.sum() < 40
+
+
+def test_what_is_no_pose_or_another_arm_is_told():
+    arm = ARMS["scorbot"]
+    T = np.stack([np.full((4, 4), np.nan), 2.0 * np.eye(4), arm.fk([0.1, 0.2, 0.3, 0.4, 0.5])])
+    assert np.isnan(arm.nearest_pose(T)).all(axis=(1, 2)).tolist() == [True, True, False]
+    assert arm.nearest_pose(np.empty((0, 4, 4))).shape == (0, 4, 4)
+    assert arm.nearest_pose(T[None]).shape == (1, 3, 4, 4)
+    with pytest.raises(ValueError, match="T has shape"):
+        arm.nearest_pose(np.eye(3))
+    with pytest.raises(ModelError, match=r"puma560 is .*; nearest_pose is for"):
+        Arm.load("puma560").nearest_pose(np.eye(4))
