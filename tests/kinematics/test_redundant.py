@@ -240,3 +240,28 @@ def test_a_preference_chooses_the_best_of_the_tried_values():
         arm.ik(T, prefer="speed")
     with pytest.raises(ValueError, match="prefer is given with redundancy or seed"):
         arm.ik(T, prefer="limits", redundancy=0.1)
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", ["KUKA iiwa 14", "an iiwa with offsets"])
+def test_intervals_of_an_arm_angle_are_those_of_a_fine_grid(name, law):
+    """None is too narrow, and none is joined across a narrow gap: their ends are roots."""
+    limit = np.radians([170, 120, 170, 120, 170, 120, 175]) * (0.5 if "offsets" in name else 1.0)
+    arm = SEVEN[name].with_limits(lower=-limit, upper=limit)
+    grid = np.linspace(-np.pi, np.pi, 20_001)
+    rng = np.random.default_rng(8)
+    wrong = 0
+    for q in rng.uniform(-limit, limit, (law.samples(1_000, 20), 7)):
+        T = arm.fk(q)
+        intervals = arm.redundancy_intervals(T)
+        allowed = arm.ik(np.broadcast_to(T, (len(grid), 4, 4)), redundancy=grid).allowed.any(
+            axis=-1
+        )
+        inside = np.zeros(len(grid), dtype=bool)
+        is_near = np.zeros(len(grid), dtype=bool)
+        for begin, end in intervals:
+            inside |= (grid >= begin) & (grid <= end)
+            # A joint may be beyond its limit by 1e-9 rad; where it only touches its limit, that is a wide step of psi.
+            is_near |= (np.abs(grid - begin) < 1e-4) | (np.abs(grid - end) < 1e-4)
+        wrong += np.count_nonzero((inside != allowed) & ~is_near)
+    law.holds("angles on the wrong side of an end", wrong, 0, name)

@@ -3,6 +3,7 @@
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.closed_form import Classification, classify
 from dhkit.kinematics.forward import forward_kinematics, frames
+from dhkit.kinematics.intervals import redundancy_intervals
 from dhkit.kinematics.inverse import inverse_kinematics, inverse_kinematics_in_chunks
 from dhkit.kinematics.jacobian import jacobian, jacobian_derivative, jacobian_dot
 from dhkit.kinematics.manipulability import (
@@ -21,7 +22,7 @@ from dhkit.kinematics.numeric import solve_numerically
 from dhkit.kinematics.path import IKPath, follow_path
 from dhkit.kinematics.preference import Preference
 from dhkit.kinematics.programs import export_kinematics, kinematic_kernels
-from dhkit.kinematics.redundant import redundancy_intervals, redundancy_of
+from dhkit.kinematics.redundant import redundancy_of
 from dhkit.kinematics.singularities import (
     Singularities,
     determinant,

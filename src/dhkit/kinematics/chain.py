@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Chain:
     """Shape (4, 4), m."""
 
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, axes: Axes) -> Chain:
         """Return the chain of an arm with revolute joints.
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, takes_robot
 from dhkit.description.poses import turned_about
@@ -34,7 +34,7 @@ _PARTS = 16
 _TIMES = 9
 """Number of divisions: the interval of 4 pi / 128 shrinks by 8 each time, to 1e-9 rad."""
 _GAIN = 0.3
-"""By how much the trace of a rotation between two samples may be larger than at both."""
+"""By how much the trace of a rotation between two of the first samples may be larger than at both."""
 _OUT_OF_REACH = -5.0
 """Value below those of all traces of rotations, which are -1 to 3."""
 _ROUNDING = 1e-12
@@ -143,23 +143,20 @@ class _Plane:
         """Return the nearest poses of poses (N, 4, 4), NaN where the position is out of reach."""
         R = self.R @ T[:, :3, :3]
         p = T[:, :3, 3] @ self.R.T + self.t
-        q5 = np.linspace(-np.pi, np.pi, _SAMPLES, endpoint=False)
-        value, _ = self._best(R, p, np.broadcast_to(q5, (len(T), _SAMPLES)))
-        # Every peak among the samples that may become the highest.
-        is_peak = (value >= np.roll(value, 1, axis=1)) & (value >= np.roll(value, -1, axis=1))
-        is_high = value >= value.max(axis=1, keepdims=True) - _GAIN
-        owner, place = np.nonzero(is_peak & is_high)
-        centre = q5[place]
+        tried = np.broadcast_to(np.linspace(-np.pi, np.pi, _SAMPLES + 1), (len(T), _SAMPLES + 1))
+        owner = np.arange(len(T))
+        value, turned = self._best(R, p, tried)
         step = 2 * np.pi / _SAMPLES
-        shares = np.linspace(-1.0, 1.0, _PARTS + 1)
-        row = np.arange(len(owner))
+        gain = _GAIN
         for _ in range(_TIMES):
-            tried = centre[:, None] + step * shares
+            row, place = _peaks(value, owner, gain)
+            owner = owner[row]
+            tried = tried[row, place, None] + step * np.linspace(-1.0, 1.0, _PARTS + 1)
             value, turned = self._best(R[owner], p[owner], tried)
-            best = value.argmax(axis=-1)
-            centre = tried[row, best]
             step *= 2 / _PARTS
-        height = value[row, best]
+            gain *= 2 / _PARTS
+        best = value.argmax(axis=1)
+        height = value.max(axis=1)
         # The highest peak of each pose is its last one in this order.
         order = np.lexsort([height, owner])
         last = order[np.append(np.flatnonzero(np.diff(owner[order])), len(order) - 1)]
@@ -224,3 +221,22 @@ class _Plane:
         gap = np.remainder(wanted - middle + np.pi, 2 * np.pi) - np.pi
         rho: Array = middle + np.copysign(np.clip(np.abs(gap), near, far), gap)
         return rho, missed
+
+
+def _peaks(value: Array, owner: NDArray[np.intp], gain: float) -> tuple[NDArray[np.intp], ...]:
+    """Return row and column of every sample (N, k) near which the largest value of its pose may lie.
+
+    Parameters
+    ----------
+    value
+        Samples in ascending order of the variable.
+    owner
+        The pose of each row, shape (N,).
+    gain
+        By how much a value between samples may be above them.
+    """
+    highest = np.full(owner[-1] + 1, -np.inf)
+    np.maximum.at(highest, owner, value.max(axis=1))
+    beside = np.pad(value, ((0, 0), (1, 1)), constant_values=-np.inf)
+    is_peak = (value >= beside[:, :-2]) & (value > beside[:, 2:])
+    return np.nonzero(is_peak & (value >= highest[owner, None] - gain))

@@ -26,9 +26,9 @@ from dhkit.description.arrays import number_array
 from dhkit.description.frames import carrying
 from dhkit.description.poses import inverse_pose, turned_about
 from dhkit.errors import ModelError
-from dhkit.kernels import EXACT_RANGE, Kernel, pose_rows
+from dhkit.kernels import EXACT_RANGE, Kernel
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import are_poses, collect
+from dhkit.kinematics.candidates import collect
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
@@ -41,7 +41,7 @@ from dhkit.kinematics.solver import Solver, solve_in_closed_form, solver_for
 
 JOINTS = 7
 _LAST = JOINTS - 1
-_LAST_JOINT = "joint 7"
+LAST_JOINT = "joint 7"
 _TRIED = 32
 """Number of steps between the values that are tried where none is asked for."""
 _WHOLE_TURN = (-np.pi, np.pi)
@@ -51,11 +51,6 @@ _RESTARTS = 31
 """Number of restarts of the search for a solution between the tried values; where there is one, few are needed."""
 _PREFERRED_TOGETHER = 256
 """Poses whose solutions at all tried values are held together, some 4 MB."""
-_STEP = np.pi / 360
-_ACCURACY = 1e-9
-"""Steps in which intervals of the redundancy are looked for, and accuracy of their ends, rad."""
-_PARTS = 16
-"""Parts into which the place of an end is divided again and again: a call takes about as long as 100 values in it."""
 
 
 def solve_redundant(
@@ -97,8 +92,8 @@ def solve_redundant(
     ValueError, TypeError
         ``redundancy``, ``seed`` or ``prefer`` does not fit, or is not finite; or ``prefer`` is given with another.
     """
-    _check_seven(description)
-    solver = _AtRedundancy.of(description)
+    check_seven(description)
+    solver = AtRedundancy.of(description)
     if prefer is not None:
         if redundancy is not None or seed is not None:
             raise ValueError("prefer is given with redundancy or seed, which leave no choice")
@@ -141,10 +136,10 @@ def redundancy_of(description: Description, q: ArrayLike) -> Array:
     >>> float(redundancy_of(panda, [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8]))
     0.8
     """
-    _check_seven(description)
+    check_seven(description)
     q = joint_array(description, q)
     found = classify(description).redundant
-    if found is None or found[0].redundancy == _LAST_JOINT:
+    if found is None or found[0].redundancy == LAST_JOINT:
         return q[..., _LAST]
 
     # The arm angle is that of axis 4 about the line from S to W, from the direction u x (W - S), with axis 1 along u.
@@ -172,7 +167,7 @@ def _unit(vectors: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _AtRedundancy:
+class AtRedundancy:
     """The solver of an arm at given redundancies: a closed form, or elimination for the joints before the last."""
 
     description: Description
@@ -181,7 +176,7 @@ class _AtRedundancy:
 
     @classmethod
     @lru_cache(maxsize=64)
-    def of(cls, description: Description) -> _AtRedundancy:
+    def of(cls, description: Description) -> AtRedundancy:
         """Return the solver of an arm."""
         found = classify(description).redundant
         if found is not None:
@@ -240,7 +235,7 @@ def redundant_kernels(description: Description) -> list[Kernel]:
     description
         The robot.
     """
-    method = _AtRedundancy.of(description).method
+    method = AtRedundancy.of(description).method
     return [method.kernel] if isinstance(method, Solver) else elimination_kernels(method)
 
 
@@ -278,11 +273,11 @@ def _broadcast(values: Array, batch: tuple[int, ...], message: str) -> Array:
         raise ValueError(message) from None
 
 
-def _at_tried_values(solver: _AtRedundancy, T: Array, threads: int) -> IKSolutions:
+def _at_tried_values(solver: AtRedundancy, T: Array, threads: int) -> IKSolutions:
     """Return each pose's solutions at a value with some inside the limits, or else with some at all."""
     batch = T.shape[:-2]
     poses = T.reshape(-1, 4, 4)
-    tried = _values_to_try(solver.description)
+    tried = values_to_try(solver.description)
     first = solver(T, np.full(batch, tried[0]), threads)
     has_some = first.valid.any(axis=-1).ravel()
     posed = first.status_code.ravel() != IKStatus.not_a_pose
@@ -337,11 +332,11 @@ def _score_of(description: Description, prefer: Preference) -> _Score:
     return _Score(lambda q: -np.sum((q - posture) ** 2, axis=-1), posture)
 
 
-def _preferred_values(solver: _AtRedundancy, T: Array, score: _Score, threads: int) -> Array:
+def _preferred_values(solver: AtRedundancy, T: Array, score: _Score, threads: int) -> Array:
     """Return each pose's tried value of the best score, shape (...); where none is allowed, one with solutions."""
     batch = T.shape[:-2]
     poses = T.reshape(-1, 4, 4)
-    tried = _values_to_try(solver.description)
+    tried = values_to_try(solver.description)
     chosen = np.full(len(poses), np.nan)
     for begin in range(0, len(poses), _PREFERRED_TOGETHER):
         some = slice(begin, begin + _PREFERRED_TOGETHER)
@@ -365,80 +360,7 @@ def _preferred_values(solver: _AtRedundancy, T: Array, score: _Score, threads: i
     return chosen.reshape(batch)
 
 
-@takes_robot
-def redundancy_intervals(
-    description: Description, T: ArrayLike, *, limits: bool = True
-) -> list[tuple[float, float]]:
-    """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
-
-    They are found at steps of half a degree, and their ends to 1e-9 rad: an interval that is narrower than a step may
-    be missing.
-
-    Parameters
-    ----------
-    description
-        The robot; seven revolute joints.
-    T
-        Pose of the tool in the world, shape (4, 4), m.
-    limits
-        Whether all joints must be inside their limits.
-
-    Returns
-    -------
-    list[tuple[float, float]]
-        Beginning and end of each interval, rad, in ascending order; of an arm angle in [-pi, pi], where one that goes
-        through pi is in two parts.
-
-    Raises
-    ------
-    ModelError, ValueError, TypeError
-        As for :func:`solve_redundant`; T has not shape (4, 4).
-
-    Examples
-    --------
-    >>> from dhkit.description import library_robot, world_to_tool
-    >>> panda = library_robot("panda")
-    >>> T = world_to_tool(panda, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
-    >>> [(round(begin, 3), round(end, 3)) for begin, end in redundancy_intervals(panda, T)]
-    [(-0.684, 2.254)]
-    """
-    pose = pose_rows(T)
-    if pose.ndim != 2:
-        raise ValueError(f"T has shape {pose.shape}; expected (4, 4)")
-    if not are_poses(pose):
-        raise ValueError("T is not a pose; expected a finite position and an orthonormal rotation")
-    _check_seven(description)
-    solver = _AtRedundancy.of(description)
-
-    def is_reached(values: Array) -> NDArray[np.bool_]:
-        found = solver(np.broadcast_to(pose, (len(values), 4, 4)), values)
-        usable = found.allowed if limits else found.valid
-        return np.asarray(usable.any(axis=-1))
-
-    tried = np.sort(_values_to_try(description))
-    count = int(np.ceil((tried[-1] - tried[0]) / _STEP)) + 1
-    grid = np.linspace(tried[0], tried[-1], count)
-    inside = is_reached(grid)
-    change = np.flatnonzero(inside[1:] != inside[:-1])
-    within = np.where(inside[change], grid[change], grid[change + 1])
-    beyond = np.where(inside[change], grid[change + 1], grid[change])
-    shares = np.arange(_PARTS + 1) / _PARTS
-    while len(change) and np.abs(within - beyond).max() > _ACCURACY:
-        places = within[:, None] + (beyond - within)[:, None] * shares
-        reached = np.ones(places.shape, dtype=bool)
-        reached[:, 1:-1] = is_reached(places[:, 1:-1].ravel()).reshape(len(change), -1)
-        reached[:, -1] = False
-        # The first place that is not reached, and the one before it.
-        first = reached.argmin(axis=1)
-        rows = np.arange(len(change))
-        within = places[rows, first - 1]
-        beyond = places[rows, first]
-
-    ends = [*grid[:1][inside[:1]], *within, *grid[-1:][inside[-1:]]]
-    return [(float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True)]
-
-
-def _check_seven(description: Description) -> None:
+def check_seven(description: Description) -> None:
     """Raise ModelError unless the arm has seven revolute joints."""
     if description.n != JOINTS or description.numbers.prismatic.any():
         words = classify(description).words
@@ -477,12 +399,12 @@ def redundancy_range(description: Description) -> tuple[float, float]:
     numbers = description.numbers
     lower = float(numbers.lower[_LAST])
     upper = float(numbers.upper[_LAST])
-    is_joint = found is None or found[0].redundancy == _LAST_JOINT
+    is_joint = found is None or found[0].redundancy == LAST_JOINT
     has_limits = is_joint and np.isfinite(lower) and np.isfinite(upper)
     return (lower, upper) if has_limits else _WHOLE_TURN
 
 
-def _values_to_try(description: Description) -> Array:
+def values_to_try(description: Description) -> Array:
     """Return redundancies from the middle outward, shape (33,), rad."""
     lower, upper = redundancy_range(description)
     values = np.linspace(lower, upper, _TRIED + 1)
