@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,11 +25,16 @@ from dhkit.kinematics.closed_form.formulas import SINGULAR
 from dhkit.kinematics.jacobian import jacobian, jacobian_kernel
 from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
+from dhkit.kinematics.polynomial.pose_results import PoseProgram, output_sizes
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import SAME_ANGLE
+from dhkit.kinematics.polynomial.solve import INEXACT, SAME_ANGLE, are_distinct
+from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, NEAR_SOLUTION, NONE, ROOTS
 from dhkit.kinematics.singular_values import has_small_singular_value
-from dhkit.kinematics.solutions import IKFlag, IKSolutions
+from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
+_TOGETHER = 256
+"""Poses whose roots are held together, some 500 KB."""
+_OUT_OF_LIMITS = np.uint8(IKFlag.out_of_limits)
 _CLUSTER = 0.05
 """Distance of singular solutions, rad, below which some of them may be false."""
 
@@ -66,6 +73,132 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
         words = classify(description).words
         raise ModelError(f"{description.name} is {words}; ik_numeric solves any arm")
     poses = pose_rows(T)
+    found = _solved(description, poses.reshape(-1, 4, 4))
+    B = len(found.branches)
+    return replace(
+        found,
+        q=found.q.reshape(*poses.shape[:-2], B, description.n),
+        valid=found.valid.reshape(*poses.shape[:-2], B),
+        flags=found.flags.reshape(*poses.shape[:-2], B),
+        status_code=found.status_code.reshape(poses.shape[:-2]),
+        distance=found.distance.reshape(poses.shape[:-2]),
+    )
+
+
+def _solved(description: Description, poses: Array) -> IKSolutions:
+    """Return the solutions of matrices (N, 4, 4)."""
+    arm = six_joints(description).elimination
+    # Interpreted, the program takes longer than what is saved; for 0 items nothing is counted.
+    if has_curves(description) or not arm.pose_kernel.is_compiled_for(0):
+        return _solved_with_care(description, poses)
+    sure = _SurePoses.of(description, arm, poses.reshape(-1, 16))
+    rows = np.flatnonzero(sure.counts == 0)
+    if not len(rows):
+        return sure.solutions(description)
+    others = _solved_with_care(description, poses[rows])
+    return sure.solutions(description, rows, others)
+
+
+@dataclass(frozen=True, eq=False)
+class _SurePoses:
+    """Solutions of those of N poses whose roots lie apart and give one solution each, as the program tells."""
+
+    q: Array
+    """Sorted solutions, shape (N, 16, 6), rad; NaN where there are fewer."""
+    flags: NDArray[np.uint8]
+    """Shape (N, 16)."""
+    counts: NDArray[np.intp]
+    """Number of solutions, shape (N,); 0 of other poses."""
+
+    @classmethod
+    def of(cls, description: Description, arm: PoseProgram, poses: Array) -> _SurePoses:
+        """Return the solutions of matrices, shape (N, 16)."""
+        numbers = description.numbers
+        parameters = np.concatenate([arm.parameters, numbers.lower, numbers.upper])
+        q = np.full((len(poses), ROOTS, description.n), np.nan)
+        flags = np.zeros((len(poses), ROOTS), dtype=np.uint8)
+        counts = np.zeros(len(poses), dtype=np.intp)
+        for begin in range(0, len(poses), _TOGETHER):
+            some = slice(begin, begin + _TOGETHER)
+            goals = poses[some]
+            outputs = [np.empty((len(goals), size)) for size in output_sizes(arm.details)]
+            arm.pose_kernel(parameters, [goals], outputs)
+            counts[some] = _filled(outputs, q[some], flags[some])
+        return cls(q, flags, counts)
+
+    def solutions(
+        self,
+        description: Description,
+        rows: NDArray[np.intp] | None = None,
+        others: IKSolutions | None = None,
+    ) -> IKSolutions:
+        """Return all solutions, with those of other poses in their rows (M,)."""
+        B = max(1, int(self.counts.max(initial=0)), 0 if others is None else len(others.branches))
+        q = _with_columns(self.q, B, np.nan)
+        flags = _with_columns(self.flags, B, 0)
+        valid = np.arange(B) < self.counts[:, None]
+        status = np.full(len(q), IKStatus.ok, dtype=np.uint8)
+        distance = np.zeros(len(q))
+        complete = True
+        if others is not None:
+            of_others = slice(len(others.branches))
+            q[rows, of_others] = others.q
+            flags[rows, of_others] = others.flags
+            valid[rows, of_others] = others.valid
+            status[rows] = others.status_code
+            distance[rows] = others.distance
+            complete = others.complete
+        return IKSolutions(
+            q=q,
+            valid=valid,
+            flags=flags,
+            status_code=status,
+            distance=distance,
+            branches=branch_names(B),
+            met=ALL_COORDINATES,
+            description=description,
+            complete=complete,
+        )
+
+
+def _with_columns(table: NDArray[Any], count: int, filling: float) -> NDArray[Any]:
+    """Return the first columns of a table (N, K, ...) as a new one, filled up where there are more than K."""
+    columns = np.full((len(table), count, *table.shape[2:]), filling, dtype=table.dtype)
+    common = min(count, table.shape[1])
+    columns[:, :common] = table[:, :common]
+    return columns
+
+
+def _filled(outputs: list[Array], q: Array, flags: NDArray[np.uint8]) -> NDArray[np.intp]:
+    """Write solutions of a chunk into ``q`` (N, 16, 6) and ``flags`` (N, 16); return their numbers, 0 if not sure."""
+    joints = outputs[0].reshape(q.shape)
+    kinds, order, are_outside = np.moveaxis(outputs[1].reshape(len(q), ROOTS, 3), -1, 0)
+    posed = outputs[3][:, 0]
+    error = outputs[4][:, 0]
+    is_root = kinds != NONE
+    counts: NDArray[np.intp] = np.count_nonzero(is_root, axis=1)
+    # Complex roots come in pairs: an odd number is not all. False for NaN.
+    is_sure = (posed == 1.0) & (error < INEXACT) & (counts % 2 == 0)
+    is_sure &= ~(kinds == DOUBTFUL).any(axis=1)
+    near = np.flatnonzero(is_sure & (kinds == NEAR_SOLUTION).any(axis=1))
+    if len(near):
+        owner, place = np.nonzero(is_root[near])
+        is_one = are_distinct(joints[near[owner], place], owner)
+        is_sure[near[owner[~is_one]]] = False
+    counts[~is_sure] = 0
+
+    B = int(counts.max(initial=0))
+    places = np.argsort(np.where(is_root, order, np.inf), axis=1)[:, :B]
+    is_solution = np.arange(B) < counts[:, None]
+    row, column = np.nonzero(is_solution)
+    place = places[is_solution]
+    q[row, column] = joints[row, place]
+    flags[row, column] = np.where(are_outside[row, place] == 1.0, _OUT_OF_LIMITS, np.uint8(0))
+    return counts
+
+
+def _solved_with_care(description: Description, poses: Array) -> IKSolutions:
+    """Return the solutions of matrices (N, 4, 4); roots may nearly coincide, or not be known well."""
     posed = are_poses(poses)
     goals = orthonormal(poses[posed])
     found = six_joints(description)(goals.reshape(-1, 16))
@@ -85,15 +218,15 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
         is_known |= is_beyond_all_links(description, goals[:, :3, 3])
     return collect(
         description,
-        table.reshape(*poses.shape[:-2], B, description.n),
+        table,
         np.full(posed.shape, np.nan),
         positions=poses[..., :3, 3],
         posed=posed,
         branches=branch_names(B),
         met=ALL_COORDINATES,
-        flags=flags.reshape(*poses.shape[:-2], B),
+        flags=flags,
         complete=bool(is_known.all()) and not has_curves(description),
-        none_exist=none_exist.reshape(posed.shape),
+        none_exist=none_exist,
     )
 
 
