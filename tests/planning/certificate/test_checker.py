@@ -48,7 +48,7 @@ def test_what_is_not_checked_is_said():
     assert certificate.not_checked == (
         "torques, as the links of joint1, joint2, joint3 have no body",
     )
-    assert "; not checked: torques" in certificate._repr_html_()
+    assert "<li>not checked: torques" in certificate._repr_html_()
     arm = dhkit.Arm.load("panda")
     swing = arm.quintic("ready", np.array([0.2, -0.4, 0.1, -2.0, 0.1, 1.7, 0.9]))
     assert arm.certify(swing, self_collision=True, clearance=0.001).not_checked == (
