@@ -14,7 +14,11 @@ from dhkit import Arm
 from dhkit.description import from_dh, pose, with_base, with_tool
 from dhkit.errors import ModelError
 from dhkit.kinematics import classify, inverse_kinematics, solve_numerically
-from dhkit.kinematics.eliminated import solve_by_elimination
+from dhkit.kinematics.eliminated import (
+    _solved_with_care,
+    elimination_kernels,
+    solve_by_elimination,
+)
 from dhkit.kinematics.eliminated_call import EliminatedPoseCall
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import SAME_ANGLE, solve
@@ -388,13 +392,76 @@ def test_single_calls_find_what_batches_find(name, law):
     assert taken > 0.3 * len(T)
 
 
+@pytest.mark.parametrize("name", SIX)
+def test_few_poses_are_solved_as_each_alone(name):
+    limit = np.radians([170.0, 120.0, 150.0, 200.0, 120.0, 360.0])
+    arm = SIX[name].with_limits(lower=-limit, upper=limit)
+    call = EliminatedPoseCall(arm.description, six_joints(arm.description).elimination)
+    call.compile()
+    T = arm.fk(np.random.default_rng(12).uniform(-np.pi, np.pi, (60, 6)))
+    alone = [call(pose_of_tool, None) for pose_of_tool in T]
+    taken = [k for k, one in enumerate(alone) if one is not None][:16]
+    few = call(T[taken], None)
+    assert few.q.shape[0] == len(few.status) == len(taken)
+    for row, k in enumerate(taken):
+        count = len(alone[k].branches)
+        assert np.array_equal(few.q[row, :count], alone[k].q)
+        assert np.array_equal(few.flags[row, :count], alone[k].flags)
+        assert few.valid[row].tolist() == [True] * count + [False] * (len(few.branches) - count)
+    assert (few.status == "ok").all() and few.complete and (few.distance == 0).all()
+    if len(taken) < len(T):
+        assert call(T[:16], None) is None or None not in alone[:16]
+    bad = T[taken[:3]].copy()
+    bad[1, 0, 0] = np.nan
+    assert call(bad, None) is None
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", SIX)
+def test_sure_poses_of_a_batch_are_solved_as_with_care(name, law):
+    limit = np.radians([170.0, 120.0, 150.0, 200.0, 120.0, 360.0])
+    arm = SIX[name].with_limits(lower=-limit, upper=limit)
+    description = arm.description
+    for one in elimination_kernels(description):
+        one.compile()
+    q = np.random.default_rng(13).uniform(-np.pi, np.pi, (law.samples(20_000, quick=500), 6))
+    q[::10, 4] = 1e-5
+    T = arm.fk(q)
+    T[3, :3, 3] *= 10.0
+    T[5, 0, 0] = np.nan
+    found = solve_by_elimination(description, T)
+    expected = _solved_with_care(description, T)
+    assert found.branches == expected.branches and found.q.flags.c_contiguous
+    is_regular = regularity(arm, q) > REGULAR
+    assert np.array_equal(found.valid[is_regular], expected.valid[is_regular])
+    apart = np.nan_to_num(2 * np.sin(np.abs(found.q - expected.q)[is_regular] / 2))
+    law.holds("difference of regular solutions", float(apart.max()), 1e-9, name)
+    for field in ("flags", "status_code"):
+        of_found, of_expected = getattr(found, field), getattr(expected, field)
+        assert np.array_equal(of_found[is_regular], of_expected[is_regular])
+    # Care may find a solution more, never one less.
+    assert (found.valid.sum(axis=1) == expected.valid.sum(axis=1)).mean() > 0.999
+    assert found.complete == expected.complete
+    again = solve_by_elimination(description, T[:6].reshape(2, 3, 4, 4))
+    assert again.q.shape[:2] == (2, 3) and again.status.shape == (2, 3)
+    assert solve_by_elimination(description, np.empty((0, 4, 4))).q.shape[0] == 0
+
+
 def test_single_calls_leave_other_arguments_to_the_ordinary_way():
     arm = SIX["FANUC CRX-10iA"]
     call = EliminatedPoseCall(arm.description, six_joints(arm.description).two_parallel)
     call.compile()
     T = arm.fk(np.array([0.3, 1.0, -0.5, 0.7, 0.2, 0.4]))
     assert call(T, None) is not None
-    others = [T.tolist(), T[None], np.asfortranarray(T), T.astype(np.float32), np.eye(3), None]
+    others = [
+        T.tolist(),
+        np.stack([T] * 17),
+        T[None, None],
+        np.asfortranarray(T),
+        T.astype(np.float32),
+        np.eye(3),
+        None,
+    ]
     for other in [*others, np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])]:
         assert call(other, None) is None
     assert call(T, np.empty((8, 6))) is None

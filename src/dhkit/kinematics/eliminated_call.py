@@ -1,4 +1,4 @@
-"""Inverse kinematics by elimination of one pose by a compiled function; see :mod:`dhkit.kernels.single_calls`."""
+"""Inverse kinematics by elimination of one pose or a few by a compiled function; see :mod:`dhkit.kernels.single_calls`."""
 
 from __future__ import annotations
 
@@ -24,12 +24,14 @@ log = logging.getLogger(__name__)
 
 _NO_DISTANCE = bytes(8)
 _STATUS = bytes([IKStatus.ok])
+_FEW = 16
+"""Largest number of poses that are solved one after the other."""
 _INSIDE = 0
 _OUTSIDE = int(IKFlag.out_of_limits)
 
 
 class EliminatedPoseCall:
-    """All solutions of one pose of an arm of six revolute joints by elimination, or None of what it does not take.
+    """All solutions of few poses of an arm of six revolute joints by elimination, or None of what it does not take.
 
     It does not take poses without solutions, nor those of which two solutions nearly coincide or one does not close.
     """
@@ -67,12 +69,43 @@ class EliminatedPoseCall:
         Parameters
         ----------
         T
-            Pose of the tool in the world, shape (4, 4), m.
+            Poses of the tool in the world, shape (4, 4), or (N, 4, 4) with few of them, m.
         out
             None is taken.
         """
-        if out is not None or type(T) is not np.ndarray or T.ndim != 2:
+        if out is not None or type(T) is not np.ndarray:
             return None
+        if T.ndim != 2:
+            return self._few(T)
+        found = self._sure(T)
+        if found is None:
+            return None
+        q, flags = found
+        count = len(flags)
+        shared = self._shared.get(count) or self._shared_by(count)
+        return IKSolutions.of_packed(q, _summary(count, flags, count), shared)
+
+    def _few(self, T: Array) -> IKSolutions | None:
+        """Return the solutions of poses (N, 4, 4), one after the other; the batch's kernels need many poses."""
+        if T.shape[1:] != (4, 4) or not 0 < len(T) <= _FEW:
+            return None
+        found = []
+        for pose in T:
+            one = self._sure(pose)
+            if one is None:
+                return None
+            found.append(one)
+        counts = [len(flags) for _, flags in found]
+        B = max(counts)
+        q = np.full((len(T), B, self._description.n), np.nan)
+        for k, (joints, _) in enumerate(found):
+            q[k, : counts[k]] = joints
+        packed = b"".join(_summary(len(flags), flags, B) for _, flags in found)
+        shared = self._shared.get(B) or self._shared_by(B)
+        return IKSolutions.of_packed(q, packed, {**shared, "batch": (len(T),)})
+
+    def _sure(self, T: Any) -> tuple[Array, bytes] | None:
+        """Return the sorted solutions (K, 6) of a pose, rad, and their flags; None of a pose that is not taken."""
         found = self._call(T, None)
         if found is None:
             return None
@@ -95,9 +128,7 @@ class EliminatedPoseCall:
         flags = bytes(count)
         if 1.0 in are_outside:
             flags = bytes([_OUTSIDE if are_outside[k] else _INSIDE for k in places])
-        summary = b"%b%b%b%b" % (_NO_DISTANCE, b"\1" * count, flags, _STATUS)
-        shared = self._shared.get(count) or self._shared_by(count)
-        return IKSolutions.of_packed(q.take(places, 0), summary, shared)
+        return q.take(places, 0), flags
 
     def _shared_by(self, count: int) -> dict[str, object]:
         """Return what all poses with so many solutions share, see :meth:`IKSolutions.of_packed`."""
@@ -108,6 +139,12 @@ class EliminatedPoseCall:
             "batch": (),
         }
         return self._shared[count]
+
+
+def _summary(count: int, flags: bytes, branches: int) -> bytes:
+    """Return what :meth:`IKSolutions.of_packed` reads of a pose with ``count`` solutions of ``branches``."""
+    rest = bytes(branches - count)
+    return b"%b%b%b%b%b%b" % (_NO_DISTANCE, b"\1" * count, rest, flags, rest, _STATUS)
 
 
 def _are_different(q: Array) -> bool:
