@@ -1,4 +1,4 @@
-"""Inverse kinematics by elimination of one pose or a few by a compiled function; see :mod:`dhkit.kernels.single_calls`."""
+"""Inverse kinematics by elimination of one pose or a few, compiled; see :mod:`dhkit.kernels.single_calls`."""
 
 from __future__ import annotations
 
