@@ -466,6 +466,20 @@ def test_a_forked_process_compiles_for_itself(tmp_path):
     assert done.stdout.split() == ["builtin_function_or_method"] * 2
 
 
+def test_calls_of_several_states_need_little_stack(tmp_path):
+    done = in_new_process(
+        "arm = Arm.load('panda')\n"
+        "arm.regressor(*np.zeros((3, 4, 7)))\n"
+        "threading.stack_size(48 * 1024)\n"
+        "thread = threading.Thread(target=arm.regressor, args=np.zeros((3, 4, 7)))\n"
+        "thread.start()\n"
+        "thread.join()\n",
+        DHKIT_KERNELS="on",
+        DHKIT_CACHE_DIR=str(tmp_path),
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_objects_that_lie_elsewhere_in_memory_are_not_read(monkeypatch):
     monkeypatch.setattr(single_calls, "FLAGS_OFFSET", single_calls.FLAGS_OFFSET + 8)
     assert not single_calls._has_known_layout()

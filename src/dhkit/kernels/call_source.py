@@ -36,6 +36,8 @@ CONTEXT = (
     "Py_DecRef",
     "PyEval_SaveThread",
     "PyEval_RestoreThread",
+    "PyMem_RawMalloc",
+    "PyMem_RawFree",
     "kernel",
 )
 """Addresses that the function reads from its context, the array that Python binds to it, in this order.
@@ -355,7 +357,18 @@ def _compute_in_lanes(
     function.label("in_lanes")
     function.add(
         f"%arrays = alloca ptr, i64 {len(pointers)}",
-        f"%work = alloca double, i64 {work_size(entries)}, align 64",
+        # Not on the stack, which a thread may have little of. Without memory the items are computed one by one.
+        f"%memory = call ptr %PyMem_RawMalloc(i64 {8 * work_size(entries) + 64})",
+        "%has_no_memory = icmp eq ptr %memory, null",
+        "br i1 %has_no_memory, label %first_item, label %with_memory",
+    )
+    function.label("with_memory")
+    function.add(
+        # The next address that is a multiple of 64.
+        "%memory_address = ptrtoint ptr %memory to i64",
+        "%negative_address = sub i64 0, %memory_address",
+        "%skipped_bytes = and i64 %negative_address, 63",
+        "%work = getelementptr i8, ptr %memory, i64 %skipped_bytes",
     )
     for k, pointer in enumerate(pointers):
         function.add(
@@ -378,6 +391,7 @@ def _compute_in_lanes(
         "br label %computed_in_lanes",
     )
     function.label("computed_in_lanes")
+    function.add("call void %PyMem_RawFree(ptr %memory)")
     if not refuses_nan:
         function.add("br label %finished")
         return
