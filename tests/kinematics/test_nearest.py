@@ -32,6 +32,46 @@ def test_a_pose_that_is_reached_is_its_own_nearest(name, law):
     law.holds("distance", np.abs(found - T).max(), 1e-6, name)
 
 
+def states_near_the_edge(arm, rng, count):
+    """Return states around local extremes of the tool's distance from axis 1, and from the origin."""
+
+    def square(q, across):
+        return float((arm.fk(q)[:3, 3] ** 2)[:across].sum())
+
+    extremes = [
+        minimize(
+            lambda q, across=across, sign=sign: sign * square(q, across), rng.uniform(-3, 3, 5)
+        ).x
+        for across, sign in [(2, 1), (2, -1), (3, 1), (3, -1)] * 2
+    ]
+    q = np.repeat(extremes, count // len(extremes), axis=0)
+    return q + rng.normal(size=q.shape) * 10 ** rng.uniform(-6, -0.5, (len(q), 1))
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("across", [0.02, 0.3, 1.0])
+@pytest.mark.parametrize("name", ARMS)
+def test_a_pose_at_the_edge_of_reach_is_its_own_nearest(name, across, law):
+    """With tools far beside axis 5, positions are reached in narrow intervals of q5 only."""
+    rng = np.random.default_rng(int(100 * across))
+    tool = np.eye(4)
+    tool[:3, 3] = across * rng.uniform(-1, 1, 3)
+    arm = ARMS[name].with_tool(tool)
+    T = arm.fk(states_near_the_edge(arm, rng, law.samples(16_000, 160)))
+    found = arm.nearest_pose(T)
+    law.holds("distance", np.abs(found - T).max(), 1e-6, name)
+
+
+def test_a_base_far_away_leaves_positions_at_the_edge_reached():
+    base = np.eye(4)
+    base[:3, 3] = 1e4
+    arm = ARMS["scorbot"].with_base(base)
+    q = random_states(200)
+    q[:, 2] *= np.resize([0.0, 1e-9, 1e-6], 200)
+    T = arm.fk(q)
+    assert np.abs(arm.nearest_pose(T) - T).max() < 1e-6
+
+
 @pytest.mark.law
 @pytest.mark.parametrize("name", ARMS)
 def test_the_nearest_pose_is_reached_at_the_wanted_position(name, law):

@@ -6,7 +6,8 @@ tool there are two shoulders, and for each a surface of rotations, by the angle 
     R(q1, rho, q5) = Rot(u, q1) Rot(v, rho) Rot(d, q5) R_0,
 
 with axis 1 along u, axes 2 to 4 along v, and axis 5 along d at zero joint values. q1 follows from q5: the tool's origin
-lies beside the plane by s(q5). At a given q5 the best rho is known in closed form; q5 is searched for.
+lies beside the plane by s(q5). At a given q5 the best rho is known in closed form; q5 is searched for on the arcs where s(q5) is
+no larger than the position's distance from axis 1.
 """
 
 from __future__ import annotations
@@ -27,18 +28,16 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane
 from dhkit.kinematics.closed_form.five_joints import five_joints_fit
 
-_SAMPLES = 128
-"""Values of q5 around the circle at which the search begins."""
-_PARTS = 16
-"""Parts into which the interval around the best value is divided again and again."""
-_TIMES = 9
-"""Number of divisions: the interval of 4 pi / 128 shrinks by 8 each time, to 1e-9 rad."""
-_GAIN = 0.3
-"""By how much the trace of a rotation between two of the first samples may be larger than at both."""
+_SAMPLES = 64
+"""Parts of an arc of q5 at whose ends the search begins."""
+_PARTS = 8
+"""Parts into which the interval around a peak is divided again and again."""
+_TIMES = 13
+"""Number of divisions: the interval shrinks by 4 each time, to 2e-10 of the arc."""
 _OUT_OF_REACH = -5.0
 """Value below those of all traces of rotations, which are -1 to 3."""
 _ROUNDING = 1e-12
-"""Share of the reach by which a position may be out of reach by rounding."""
+"""Share of the reach, and of the distance from the world's origin, by which a position may be out of reach."""
 _U = np.array([0.0, 1.0, 0.0])
 _V = np.array([0.0, 0.0, 1.0])
 """Directions u and v in the frame (x, u, v)."""
@@ -50,7 +49,8 @@ _TOGETHER = 256
 def nearest_pose(description: Description, T: ArrayLike) -> Array:
     """Return the nearest pose that an arm of five joints reaches: the same position, turned by the least angle.
 
-    Joint limits are not regarded. The angle is the least to 1e-7 rad.
+    Joint limits are not regarded. The angle is the least to 1e-7 rad. At a position on axis 1, joint 1 is free if axis
+    5 goes through it too: there the least angle at q1 = 0 is taken.
 
     Parameters
     ----------
@@ -105,6 +105,8 @@ class _Plane:
     """Direction of axis 5 at zero joint values, shape (3,)."""
     arm: Array
     """From axis 5 to the tool's origin, across the axis, at zero joint values, shape (3,), m."""
+    first_roll: float
+    """The roll at zero joint values: the angle of ``arm`` about axis 5 from v."""
     foot: Array
     """From axis 4 to the point of axis 5 next to the tool's origin, in the plane; and its v coordinate; (3,), m."""
     a1: float
@@ -128,12 +130,15 @@ class _Plane:
         R = ArmPlane.of(axes).R
         R_0 = R @ axes.T_world_tool[:3, :3]
         L2, L3 = float(p["L2"]), float(p["L3"])
+        d = R_0 @ p["axis"]
+        arm = -R_0 @ p["foot"]
         return cls(
             R=R,
             t=p["T_plane_world"][:3, 3],
             R_0=R_0,
-            d=R_0 @ p["axis"],
-            arm=-R_0 @ p["foot"],
+            d=d,
+            arm=arm,
+            first_roll=float(np.arctan2(np.cross(d, _V) @ arm, arm[2])),
             foot=np.array([*p["lever"], float(p["offset"])]),
             a1=float(p["a1"]),
             reach=(abs(L2 - L3), L2 + L3),
@@ -143,32 +148,73 @@ class _Plane:
         """Return the nearest poses of poses (N, 4, 4), NaN where the position is out of reach."""
         R = self.R @ T[:, :3, :3]
         p = T[:, :3, 3] @ self.R.T + self.t
-        tried = np.broadcast_to(np.linspace(-np.pi, np.pi, _SAMPLES + 1), (len(T), _SAMPLES + 1))
-        owner = np.arange(len(T))
-        value, turned = self._best(R, p, tried)
-        step = 2 * np.pi / _SAMPLES
-        gain = _GAIN
+        far = np.linalg.norm(T[:, :3, 3], axis=1) + np.linalg.norm(self.t)
+        rounding = _ROUNDING * (1.0 + far / self.reach[1])
+        # Four rows for each pose: two shoulders, and two arcs of the roll.
+        owner = np.repeat(np.arange(len(T)), 4)
+        shoulder = np.tile([1.0, 1.0, -1.0, -1.0], len(T))
+        turn = np.tile([1.0, -1.0, 1.0, -1.0], len(T))
+        begin, end = (np.repeat(values, 4) for values in self._arc(np.hypot(p[:, 0], p[:, 2])))
+
+        def best(row: NDArray[np.intp], share: Array) -> tuple[Array, Array, Array, Array]:
+            """Return what _best returns at parts of the rows' arcs, and q5; the parts are closer at an arc's ends."""
+            part = (1.0 - np.cos(np.pi * share)) / 2
+            roll = begin[row, None] + (end - begin)[row, None] * part
+            q5 = turn[row, None] * roll - self.first_roll
+            pose = owner[row]
+            return *self._best(R[pose], p[pose], shoulder[row], q5, rounding[pose]), q5
+
+        row = np.arange(len(owner))
+        share = np.broadcast_to(np.linspace(0.0, 1.0, _SAMPLES + 1), (len(row), _SAMPLES + 1))
+        value, *_ = best(row, share)
+        peak, place = _peaks(value)
+        row = row[peak]
+        middle = share[peak, place]
+        step = 1.0 / _SAMPLES
         for _ in range(_TIMES):
-            row, place = _peaks(value, owner, gain)
-            owner = owner[row]
-            tried = tried[row, place, None] + step * np.linspace(-1.0, 1.0, _PARTS + 1)
-            value, turned = self._best(R[owner], p[owner], tried)
+            share = middle[:, None] + step * np.linspace(-1.0, 1.0, _PARTS + 1)
+            value, q1, rho, q5 = best(row, share)
+            at = np.arange(len(row)), value.argmax(axis=1)
+            middle = share[at]
             step *= 2 / _PARTS
-            gain *= 2 / _PARTS
-        best = value.argmax(axis=1)
-        height = value.max(axis=1)
+        height = value[at]
         # The highest peak of each pose is its last one in this order.
-        order = np.lexsort([height, owner])
-        last = order[np.append(np.flatnonzero(np.diff(owner[order])), len(order) - 1)]
+        order = np.lexsort([height, owner[row]])
+        last = order[np.append(np.flatnonzero(np.diff(owner[row][order])), len(order) - 1)]
+        q1, rho, q5 = (angles[at][last] for angles in (q1, rho, q5))
+        turned = turned_about(_U, q1) @ turned_about(_V, rho) @ turned_about(self.d, q5) @ self.R_0
         nearest = T.copy()
-        nearest[:, :3, :3] = self.R.T @ turned[last, best[last]]
+        nearest[:, :3, :3] = self.R.T @ turned
         nearest[height[last] < _OUT_OF_REACH] = np.nan
         return nearest
 
-    def _best(self, R: Array, p: Array, q5: Array) -> tuple[Array, Array]:
-        """Return the best rotations (N, k, 3, 3) at values (N, k) of joint 5, and trace(R^T rotation), (N, k).
+    def _arc(self, far: Array) -> tuple[Array, Array]:
+        """Return the least and the largest roll at which the tool is beside the plane by no more than ``far``, (N,), m.
+
+        The tool's origin lies beside the plane by foot + |arm| cos(roll), at rolls and at their negatives.
+        """
+        radius = max(float(np.linalg.norm(self.arm)), np.finfo(float).tiny)
+        least = np.arccos(np.clip((far - self.foot[2]) / radius, -1.0, 1.0))
+        most = np.arccos(np.clip((-far - self.foot[2]) / radius, -1.0, 1.0))
+        return least, most
+
+    def _best(
+        self, R: Array, p: Array, shoulder: Array, q5: Array, rounding: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return the largest trace(R^T rotation) at values (N, k) of joint 5, and the angles q1 and rho it is at.
 
         Where the position is out of reach, the trace is below ``_OUT_OF_REACH``, by how far it is.
+
+        Parameters
+        ----------
+        R, p
+            The wanted poses in the frame (x, u, v), shapes (N, 3, 3) and (N, 3), m.
+        shoulder
+            1 where the tool is in front of axis 1 in the plane, -1 where it is behind it, shape (N,).
+        q5
+            Shape (N, k), rad.
+        rounding
+            Share of the reach by which a position may be out of reach by rounding, shape (N,).
         """
         roll = turned_about(self.d, q5)
         lever = roll @ self.arm + self.foot
@@ -177,28 +223,19 @@ class _Plane:
         s = lever[..., 2]
         square = (p[:, 0] ** 2 + p[:, 2] ** 2)[:, None] - s**2
         beside = np.maximum(-square, 0.0) / self.reach[1] ** 2
-        x = np.sqrt(np.maximum(square, 0.0))
-        best = np.full(q5.shape, -np.inf)
-        turned = np.full((*q5.shape, 3, 3), np.nan)
-        for side in (x, -x):
-            q1 = np.arctan2(s, side) - np.arctan2(p[:, 2], p[:, 0])[:, None]
-            turn = turned_about(_U, q1)
-            # trace(R^T turn Rot(v, rho) rolled) = trace(Rot(v, rho) B).
-            B = rolled @ np.swapaxes(R, -1, -2)[:, None] @ turn
-            along = B[..., 0, 0] + B[..., 1, 1]
-            across = B[..., 0, 1] - B[..., 1, 0]
-            to_axis_2 = np.stack(
-                [side - self.a1, np.broadcast_to(p[:, 1, None], side.shape)], axis=-1
-            )
-            rho, missed = self._angle(np.arctan2(across, along), to_axis_2, lever[..., :2])
-            missed = missed + beside
-            trace = B[..., 2, 2] + np.cos(rho) * along + np.sin(rho) * across
-            value = np.where(missed > _ROUNDING, 2 * _OUT_OF_REACH - missed, trace)
-            is_better = value > best
-            best = np.where(is_better, value, best)
-            pitched = turn @ turned_about(_V, rho) @ rolled
-            turned = np.where(is_better[..., None, None], pitched, turned)
-        return best, turned
+        x = shoulder[:, None] * np.sqrt(np.maximum(square, 0.0))
+        q1 = np.arctan2(s, x) - np.arctan2(p[:, 2], p[:, 0])[:, None]
+        turn = turned_about(_U, q1)
+        # trace(R^T turn Rot(v, rho) rolled) = trace(Rot(v, rho) B).
+        B = rolled @ np.swapaxes(R, -1, -2)[:, None] @ turn
+        along = B[..., 0, 0] + B[..., 1, 1]
+        across = B[..., 0, 1] - B[..., 1, 0]
+        to_axis_2 = np.stack([x - self.a1, np.broadcast_to(p[:, 1, None], x.shape)], axis=-1)
+        rho, missed = self._angle(np.arctan2(across, along), to_axis_2, lever[..., :2])
+        missed = missed + beside
+        trace = B[..., 2, 2] + np.cos(rho) * along + np.sin(rho) * across
+        value = np.where(missed > rounding[:, None], 2 * _OUT_OF_REACH - missed, trace)
+        return value, q1, rho
 
     def _angle(self, wanted: Array, tool: Array, lever: Array) -> tuple[Array, Array]:
         """Return the angles nearest to the wanted ones (...) at which two links reach axis 4, and how far they miss it.
@@ -223,20 +260,7 @@ class _Plane:
         return rho, missed
 
 
-def _peaks(value: Array, owner: NDArray[np.intp], gain: float) -> tuple[NDArray[np.intp], ...]:
-    """Return row and column of every sample (N, k) near which the largest value of its pose may lie.
-
-    Parameters
-    ----------
-    value
-        Samples in ascending order of the variable.
-    owner
-        The pose of each row, shape (N,).
-    gain
-        By how much a value between samples may be above them.
-    """
-    highest = np.full(owner[-1] + 1, -np.inf)
-    np.maximum.at(highest, owner, value.max(axis=1))
+def _peaks(value: Array) -> tuple[NDArray[np.intp], ...]:
+    """Return row and column of every sample (N, k) that is larger than the next, and no smaller than the last."""
     beside = np.pad(value, ((0, 0), (1, 1)), constant_values=-np.inf)
-    is_peak = (value >= beside[:, :-2]) & (value > beside[:, 2:])
-    return np.nonzero(is_peak & (value >= highest[owner, None] - gain))
+    return np.nonzero((value >= beside[:, :-2]) & (value > beside[:, 2:]))
