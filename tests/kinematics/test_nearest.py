@@ -85,6 +85,18 @@ def test_the_nearest_pose_is_reached_at_the_wanted_position(name, law):
     law.holds("closure", np.abs(arm.fk(q) - found).max(), 1e-8, name)
 
 
+def test_both_shoulders_reach_a_position_on_axis_1():
+    """Joint 1 is given by axis 5 there; where the arm is stretched too, one shoulder alone reaches."""
+    arm = ARMS["scorbot"]
+    T = arm.fk(random_states(300))
+    T[:, :2, 3] = 0.0
+    T[:, 2, 3] = np.linspace(0.0, 0.9, 300)
+    found = arm.nearest_pose(T)
+    is_reached = np.isfinite(found[:, 0, 0])
+    assert is_reached.sum() > 200
+    assert arm.ik(found[is_reached]).valid.any(axis=-1).all()
+
+
 @pytest.mark.law
 @pytest.mark.parametrize("name", ARMS)
 def test_no_other_joint_values_come_nearer(name, law):

@@ -242,26 +242,44 @@ def test_a_preference_chooses_the_best_of_the_tried_values():
         arm.ik(T, prefer="limits", redundancy=0.1)
 
 
+def angles_on_the_wrong_side(arm, T):
+    """Return how many arm angles of a fine grid are inside an interval but not allowed, or the other way round."""
+    grid = np.linspace(-np.pi, np.pi, 20_001)
+    intervals = arm.redundancy_intervals(T)
+    found = arm.ik(np.broadcast_to(T, (len(grid), 4, 4)), redundancy=grid)
+    inside = np.zeros(len(grid), dtype=bool)
+    is_near = np.zeros(len(grid), dtype=bool)
+    for begin, end in intervals:
+        inside |= (grid >= begin) & (grid <= end)
+        # A joint may be beyond its limit by 1e-9 rad; where it only touches its limit, that is a wide step of psi.
+        is_near |= (np.abs(grid - begin) < 1e-4) | (np.abs(grid - end) < 1e-4)
+    return np.count_nonzero((inside != found.allowed.any(axis=-1)) & ~is_near)
+
+
 @pytest.mark.law
 @pytest.mark.parametrize("name", ["KUKA iiwa 14", "an iiwa with offsets"])
 def test_intervals_of_an_arm_angle_are_those_of_a_fine_grid(name, law):
     """None is too narrow, and none is joined across a narrow gap: their ends are roots."""
     limit = np.radians([170, 120, 170, 120, 170, 120, 175]) * (0.5 if "offsets" in name else 1.0)
     arm = SEVEN[name].with_limits(lower=-limit, upper=limit)
-    grid = np.linspace(-np.pi, np.pi, 20_001)
     rng = np.random.default_rng(8)
-    wrong = 0
-    for q in rng.uniform(-limit, limit, (law.samples(1_000, 20), 7)):
-        T = arm.fk(q)
-        intervals = arm.redundancy_intervals(T)
-        allowed = arm.ik(np.broadcast_to(T, (len(grid), 4, 4)), redundancy=grid).allowed.any(
-            axis=-1
-        )
-        inside = np.zeros(len(grid), dtype=bool)
-        is_near = np.zeros(len(grid), dtype=bool)
-        for begin, end in intervals:
-            inside |= (grid >= begin) & (grid <= end)
-            # A joint may be beyond its limit by 1e-9 rad; where it only touches its limit, that is a wide step of psi.
-            is_near |= (np.abs(grid - begin) < 1e-4) | (np.abs(grid - end) < 1e-4)
-        wrong += np.count_nonzero((inside != allowed) & ~is_near)
+    wrong = sum(
+        angles_on_the_wrong_side(arm, arm.fk(q))
+        for q in rng.uniform(-limit, limit, (law.samples(1_000, 20), 7))
+    )
     law.holds("angles on the wrong side of an end", wrong, 0, name)
+
+
+@pytest.mark.parametrize(
+    "quarters", [(2, 0, 0, 0, 1, 2, 1), (-3, -2, -4, -2, -3, 0, -4), (1, 0, 1, -2, 0, 0, -1)]
+)
+def test_intervals_of_an_arm_stretched_along_its_first_axis(quarters):
+    """Joints 1 and 3 turn about one line at every arm angle: no root tells where one of them is at a limit."""
+    q = np.array(quarters) * np.pi / 2
+    rng = np.random.default_rng(9)
+    arm = SEVEN["KUKA iiwa 14"]
+    for _ in range(5):
+        arm = arm.with_limits(
+            lower=q - rng.uniform(0.1, 3.0, 7), upper=q + rng.uniform(0.1, 3.0, 7)
+        )
+        assert angles_on_the_wrong_side(arm, arm.fk(q)) == 0

@@ -27,6 +27,7 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.formulas import SINGULAR
 from dhkit.kinematics.redundant import LAST_JOINT, AtRedundancy, check_seven, values_to_try
 
 _STEP = np.pi / 360
@@ -50,9 +51,10 @@ def redundancy_intervals(
 ) -> list[tuple[float, float]]:
     """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
 
-    Of an arm with a spherical shoulder and a spherical wrist their ends are roots of equations, to rounding. For other
-    arms joint 7 is tried at steps of half a degree, and the ends are found to 1e-9 rad: an interval that is narrower
-    than a step may be missing.
+    Of an arm with a spherical shoulder and a spherical wrist their ends are roots of equations, to rounding; an
+    interval narrower than 3e-6 rad may be missing. For other arms joint 7 is tried at steps of half a degree, and the
+    ends are found to 1e-9 rad: an interval that is narrower than a step may be missing. So is the arm angle where the
+    arm is stretched along axis 1, or axis 7, so that joints 1 and 3, or 5 and 7, turn about one line at every angle.
 
     Parameters
     ----------
@@ -100,7 +102,13 @@ def redundancy_intervals(
         return _sampled(is_reached, values_to_try(description))
     ends = np.array([-np.pi, np.pi])
     if limits:
-        ends = np.sort(np.append(ends, _possible_ends(description, solver, pose)))
+        q = solver(np.broadcast_to(pose, (3, 4, 4)), _THIRDS).q
+        theta = q + Chain.of(Axes.of(description)).offset
+        is_aligned = np.abs(np.sin(theta[..., _TRIPLES[:, 1]])) < SINGULAR
+        if np.isnan(q).any() or is_aligned.all(axis=(0, 1)).any():
+            # Out of reach; or the outer joints of a triple turn about one line, so that their sum alone is known.
+            return _sampled(is_reached, values_to_try(description))
+        ends = np.sort(np.append(ends, _possible_ends(description, theta)))
         ends = ends[np.diff(ends, append=np.inf) > _TOUCHING]
     return _between(is_reached, ends)
 
@@ -115,21 +123,20 @@ def _between(
     return list(zip(begins.tolist(), stops.tolist(), strict=True))
 
 
-def _possible_ends(description: Description, solver: AtRedundancy, T: Array) -> Array:
-    """Return the arm angles in (-pi, pi] at which a joint is at a limit, or may jump, shape (N,), rad."""
-    q = solver(np.broadcast_to(T, (3, 4, 4)), _THIRDS).q
-    # One branch of each sign of joint 4: the others have the same components.
-    q = q[:, [0, 4]]
-    if np.isnan(q).any():
-        return np.empty(0)
-    offset = Chain.of(Axes.of(description)).offset[_TRIPLES]
+def _possible_ends(description: Description, theta: Array) -> Array:
+    """Return the arm angles in (-pi, pi] at which a joint is at a limit, or may jump, shape (N,), rad.
+
+    ``theta`` has the joints' angles at ``_THIRDS``, shape (3, 8, 7).
+    """
     numbers = description.numbers
+    offset = Chain.of(Axes.of(description)).offset[_TRIPLES]
     at_limits = np.stack([numbers.lower[_TRIPLES], numbers.upper[_TRIPLES]]) + offset
     at_limits = np.where(np.isfinite(at_limits), at_limits, np.nan)[:, None]
 
     # (a, b, c) of the components, first axis, for each sign of joint 4 and each triple, shape (3, 2, 2, 1 or 2).
-    theta = q[..., _TRIPLES] + offset
-    c, s = np.cos(theta), np.sin(theta)
+    # One branch of each sign of joint 4 is enough: the others have the same components.
+    angles = theta[:, [0, 4]][..., _TRIPLES]
+    c, s = np.cos(angles), np.sin(angles)
     middle, outer = [1], [0, 2]
     polar = _coefficients(c[..., middle])
     along = _coefficients(c[..., outer] * s[..., middle])

@@ -30,6 +30,11 @@ from dhkit.kinematics.closed_form.five_joints import five_joints_fit
 
 _SAMPLES = 64
 """Parts of an arc of q5 at whose ends the search begins."""
+_LEVELS = 3
+"""Number of times that the surroundings of samples nearly in reach are sampled again: intervals of q5 in which the
+position is in reach may be as narrow as 1e-6 rad beside others."""
+_NEARLY = 10.0
+"""How far such a sample is out of reach at most, over the square of the distance between samples."""
 _PARTS = 8
 """Parts into which the interval around a peak is divided again and again."""
 _TIMES = 13
@@ -164,19 +169,28 @@ class _Plane:
             pose = owner[row]
             return *self._best(R[pose], p[pose], shoulder[row], q5, rounding[pose]), q5
 
+        # Rows that are sampled, and around which part of the arc. Every peak is a row of the search below.
         row = np.arange(len(owner))
-        share = np.broadcast_to(np.linspace(0.0, 1.0, _SAMPLES + 1), (len(row), _SAMPLES + 1))
-        value, *_ = best(row, share)
-        peak, place = _peaks(value)
-        row = row[peak]
-        middle = share[peak, place]
-        step = 1.0 / _SAMPLES
+        middle = np.full(len(row), 0.5)
+        step = 0.5
+        peaks = []
+        for _ in range(_LEVELS):
+            share = middle[:, None] + step * np.linspace(-1.0, 1.0, _SAMPLES + 1)
+            value, *_ = best(row, share)
+            step *= 2 / _SAMPLES
+            at = _peaks(value)
+            peaks.append((row[at[0]], share[at], np.full(len(at[0]), step)))
+            missed = 2 * _OUT_OF_REACH - value
+            at = np.nonzero((missed > 0.0) & (missed < _NEARLY * step**2))
+            row = row[at[0]]
+            middle = share[at]
+        row, middle, size = (np.concatenate(parts) for parts in zip(*peaks, strict=True))
         for _ in range(_TIMES):
-            share = middle[:, None] + step * np.linspace(-1.0, 1.0, _PARTS + 1)
+            share = middle[:, None] + size[:, None] * np.linspace(-1.0, 1.0, _PARTS + 1)
             value, q1, rho, q5 = best(row, share)
             at = np.arange(len(row)), value.argmax(axis=1)
             middle = share[at]
-            step *= 2 / _PARTS
+            size = size * (2 / _PARTS)
         height = value[at]
         # The highest peak of each pose is its last one in this order.
         order = np.lexsort([height, owner[row]])

@@ -136,8 +136,8 @@ def _shoulders(
     square = (r - fabs(offset)) * (r + fabs(offset))
     front = sqrt(if_else(square > 0, square, 0.0))
 
-    def side(X: SX) -> Shoulder:
-        in_plane = unit_pair(X, offset, scale)
+    def side(X: SX, facing: float) -> Shoulder:
+        in_plane = unit_pair(X, offset, scale, (facing, 0.0))
         at_zero = unit_pair(x, v, scale, (free[0], -free[1]))
         return Shoulder(
             q1=add_angles(in_plane, at_zero, -1.0),
@@ -148,7 +148,7 @@ def _shoulders(
             clamped=logic_and(square < 0, logic_not(beyond)),
         )
 
-    return side(front), side(-front)
+    return side(front, 1.0), side(-front, -1.0)
 
 
 def ordered_shoulders(
