@@ -6,8 +6,8 @@ tool there are two shoulders, and for each a surface of rotations, by the angle 
     R(q1, rho, q5) = Rot(u, q1) Rot(v, rho) Rot(d, q5) R_0,
 
 with axis 1 along u, axes 2 to 4 along v, and axis 5 along d at zero joint values. q1 follows from q5: the tool's origin
-lies beside the plane by s(q5). At a given q5 the best rho is known in closed form; q5 is searched for on the arcs where s(q5) is
-no larger than the position's distance from axis 1.
+lies beside the plane by s(q5). At a given q5 the best rho is known in closed form; q5 is searched for on the arcs
+where s(q5) is no larger than the position's distance from axis 1.
 """
 
 from __future__ import annotations
