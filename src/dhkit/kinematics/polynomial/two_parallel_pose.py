@@ -14,8 +14,6 @@ import casadi as ca
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import orthonormal_goal
 from dhkit.kinematics.polynomial.pose_steps import (
-    BESIDE,
-    COINCIDES,
     RESULTS,
     known_solutions,
     root_steps,
@@ -101,8 +99,7 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
     is_tried, is_real, closeness = of_root
     signs, also = fitting_signs(Numbers.read(parameters[:COUNT]), meeting, goal, angle)
     q, error, is_regular = solution_function(meeting)(parameters[:COUNT], goal, angle, signs)
-    is_singular = ca.logic_and(closeness == BESIDE, ca.logic_not(is_regular))
-    is_delicate = ca.logic_or(closeness == COINCIDES, is_singular)
+    is_delicate = ca.logic_and(closeness > 0.0, ca.logic_not(is_regular))
     inputs = {
         "parameters": parameters,
         "goal": goal,

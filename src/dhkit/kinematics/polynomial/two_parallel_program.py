@@ -11,7 +11,7 @@ import casadi as ca
 
 from dhkit.kinematics.closed_form.formulas import turned_about_x, turned_about_z
 from dhkit.kinematics.polynomial.extension import SIGNS, Element, Extension, Root
-from dhkit.kinematics.polynomial.pivots import determinant
+from dhkit.kinematics.polynomial.pivots import eliminated, not_zero
 from dhkit.symbolic import Graph
 
 SX: TypeAlias = Any
@@ -24,7 +24,7 @@ TakeRoot: TypeAlias = Callable[[Element, int], Element]
 
 COUNT = 1 + 6 + 5 + 5 + 10 + 12 + 12
 """Number of parameters."""
-_POLISHING_STEPS = 2
+_POLISHING_STEPS = 1
 """Newton steps from a root of the polynomial, whose error is about 1e-10 rad, to rounding."""
 _LARGEST_STEP = 1e-3
 """Larger steps, rad, are not taken: near a double root they lead elsewhere."""
@@ -115,23 +115,56 @@ def solution_function(meeting: tuple[int, int]) -> ca.Function:
     thetas = [theta_2, theta_3, *(ca.atan2(sine, cosine) for cosine, sine in arm.wrist)]
     q = [x, *(theta - p.offset[k] for k, theta in enumerate(thetas, start=1))]
     q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
-    error, J = _error_and_jacobian(p, T, q)
-    outputs = [ca.vertcat(*q), error, _is_regular(J)]
+    # q1 alone was polished, to which the others follow: one step of all of them closes to rounding.
+    twist, J = _twist_and_jacobian(p, T, q)
+    step, is_regular = _newton_step(J, twist)
+    is_small = ca.mmax(ca.fabs(step)) < _LARGEST_STEP
+    q = [ca.if_else(is_small, angle + step[k], angle) for k, angle in enumerate(q)]
+    q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
+    outputs = [ca.vertcat(*q), _error(p, T, q), is_regular]
     return ca.Function("solution", [parameters, T, q_1, signs], outputs)
 
 
-def _is_regular(J: SX) -> SX:
-    """Return whether a Jacobian of shares of the reach has no singular value below 1e-4.
+def _newton_step(J: SX, twist: SX) -> tuple[SX, SX]:
+    """Return the step of Newton's method, 6 x 1, rad, and whether the Jacobian has no singular value below 1e-4.
 
-    The product of the five larger singular values is at most (|J|^2 / 5)^(5/2), with the squares' sum |J|^2.
+    ``J`` and ``twist`` have lengths as shares of the reach. The product of the five larger singular values is at most
+    (|J|^2 / 5)^(5/2), with the squares' sum |J|^2.
     """
-    rows = [[J[row, column] for column in range(6)] for row in range(6)]
+    A, right, _ = eliminated([ca.horzsplit(row) for row in ca.vertsplit(J)], ca.vertsplit(twist))
+    determinant = ca.SX(1.0)
+    step: list[SX] = []
+    for k in reversed(range(6)):
+        determinant = determinant * A[k][k]
+        known = sum((A[k][j] * x for j, x in enumerate(step, start=k + 1)), ca.SX(0.0))
+        step.insert(0, (right[k] - known) / not_zero(A[k][k]))
     mean = ca.sumsqr(J) / 5.0
-    return ca.fabs(determinant(rows)) > _REGULAR * mean * mean * ca.sqrt(mean)
+    return ca.vertcat(*step), ca.fabs(determinant) > _REGULAR * mean * mean * ca.sqrt(mean)
 
 
-def _error_and_jacobian(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX]:
-    """Return the error of the tool's pose at joint values, and its Jacobian, 6 x 6, lengths as shares of the reach."""
+def _twist_and_jacobian(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX]:
+    """Return the twist to the tool's pose from that at joint values, 6 x 1, and the Jacobian, 6 x 6, of the position.
+
+    Lengths are shares of the reach.
+    """
+    R, shift, axes, end = _forward(p, T, q)
+    R_goal, _ = last_frame(p, T)
+    # sin(t) times the axis of R_goal R^T, t its angle.
+    turn = sum((ca.cross(R[:, k], R_goal[:, k]) for k in range(3)), ca.SX.zeros(3)) / 2.0
+    columns = [ca.vertcat(ca.cross(axis, end - origin), axis) for axis, origin in axes]
+    return ca.vertcat(shift, turn), ca.horzcat(*columns)
+
+
+def _error(p: Numbers, T: SX, q: list[SX]) -> SX:
+    """Return the error of the tool's pose at joint values: the larger one of a share of the reach, and rad."""
+    R, shift, *_ = _forward(p, T, q)
+    R_goal, _ = last_frame(p, T)
+    # |R_g - R|_F = sqrt(8) sin(t / 2) for rotations that are t apart: over sqrt(2) it is t for small ones.
+    return ca.sqrt(ca.fmax(ca.sumsqr(shift), ca.sumsqr(R_goal - R) / 2.0))
+
+
+def _forward(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX, list[tuple[SX, SX]], SX]:
+    """Return the last frame's rotation, the shift to the tool's goal, the axes with their origins, and the tool."""
     R_goal, p_goal = last_frame(p, T)
     R = ca.SX.eye(3)
     position = ca.SX.zeros(3)
@@ -145,14 +178,9 @@ def _error_and_jacobian(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX]:
             R = R @ _rotation(0, *p.alpha[k])
 
     # The tool is at -R_t^T p_t in the last frame, with the last frame (R_t, p_t) as seen from the tool.
-    turned = R_goal - R
     tool = p.T_tool_last[:, :3].T @ -p.T_tool_last[:, 3]
-    shift = p_goal - position + turned @ tool
-    # |R_g - R|_F = sqrt(8) sin(t / 2) for rotations that are t apart: over sqrt(2) it is t for small ones.
-    error = ca.sqrt(ca.fmax(ca.sumsqr(shift), ca.sumsqr(turned) / 2.0))
-    end = position + R @ tool
-    columns = [ca.vertcat(ca.cross(axis, end - origin), axis) for axis, origin in axes]
-    return error, ca.horzcat(*columns)
+    shift = p_goal - position + (R_goal - R) @ tool
+    return R, shift, axes, position + R @ tool
 
 
 def _pair(angle: SX) -> Pair:
