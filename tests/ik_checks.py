@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from dhkit.description import Convention, Description, world_to_frames, world_to_tool
+from dhkit.description import (
+    Convention,
+    Description,
+    from_dh,
+    library_robot,
+    world_to_frames,
+    world_to_tool,
+)
 from dhkit.kinematics import IKSolutions, forward_kinematics
 
 FAMILY_A = (
@@ -29,6 +36,19 @@ FEW_JOINTS = (
     "ax12_arm",
     "al5d",
 )
+FIVE_JOINTS = {
+    "scorbot": from_dh(
+        [[0, 349, 16, -90], [0, 0, 221, 0], [0, 0, 221, 0], [90, 0, 0, 90], [0, 145, 0, 0]],
+        name="scorbot",
+        length="mm",
+        angle="deg",
+    )
+}
+
+
+def robot(name: str) -> Description:
+    """Return a robot of the library, or of ``FIVE_JOINTS``."""
+    return FIVE_JOINTS[name] if name in FIVE_JOINTS else library_robot(name)
 
 
 def closure(

@@ -140,6 +140,19 @@ def three_parallel_arms(draw):
 
 
 @st.composite
+def five_joint_arms(draw):
+    """Draw a turntable with three parallel joints and a last one across them."""
+    right = [draw(signed) * np.pi / 2 for _ in range(2)]
+    flat = [draw(st.sampled_from([0.0, np.pi])) for _ in range(2)]
+    a = [draw(shift), draw(signed) * draw(link), draw(signed) * draw(link), draw(shift)]
+    rows = [
+        (draw(turn), draw(shift), *of_link)
+        for of_link in zip([*a, draw(shift)], [right[0], *flat, right[1], draw(turn)], strict=True)
+    ]
+    return draw(placed(from_dh(rows)))
+
+
+@st.composite
 def slide_arms(draw):
     """Draw an arm of the Stanford's family."""
     right = [draw(signed) * np.pi / 2 for _ in range(4)]

@@ -20,9 +20,9 @@ from dhkit.kinematics import inverse_kinematics
 from dhkit.symbolic import inverse_derivation
 from dhkit.symbolic.equations import latex_document
 from dhkit.verification import random_states
-from ik_checks import FEW_JOINTS, SIX_JOINTS
+from ik_checks import FEW_JOINTS, FIVE_JOINTS, SIX_JOINTS, robot
 
-LIBRARY = [*SIX_JOINTS, *FEW_JOINTS]
+LIBRARY = [*SIX_JOINTS, *FIVE_JOINTS, *FEW_JOINTS]
 AGREES = 1e-8
 """rad and m: two evaluations of the same formulas near singular poses, where an error of rounding grows."""
 
@@ -70,7 +70,7 @@ def exported(derivation, language, folder):
 @pytest.mark.parametrize("name", LIBRARY)
 @pytest.mark.slow
 def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_path):
-    arm = library_robot(name)
+    arm = robot(name)
     solve = exported(inverse_derivation(arm), language, tmp_path)
     T = world_to_tool(arm, random_states(arm, 100, seed=4))
     T[::10, :3, 3] *= 3  # out of reach
@@ -112,7 +112,7 @@ def test_exported_code_refuses_what_is_no_pose(language, tmp_path):
 @pytest.mark.parametrize("language", ["c", "python"])
 @pytest.mark.parametrize("name", SIX_JOINTS)
 def test_exported_code_reaches_singular_poses(name, language, tmp_path):
-    arm = library_robot(name)
+    arm = robot(name)
     solve = exported(inverse_derivation(arm), language, tmp_path)
     q = random_states(arm, 40, seed=6)
     q[:, 4] = np.array([0.0, 1e-15, 1e-12, 1e-8])[np.arange(40) % 4]
@@ -126,7 +126,7 @@ def test_exported_code_reaches_singular_poses(name, language, tmp_path):
 def test_exported_matlab_runs_in_octave(name, tmp_path):
     if shutil.which("octave") is None:
         pytest.skip("Octave is not installed")
-    arm = library_robot(name)
+    arm = robot(name)
     derivation = inverse_derivation(arm)
     (path,) = derivation.export(tmp_path, "matlab")
     T = world_to_tool(arm, random_states(arm, 1, seed=4))[0]
@@ -156,7 +156,7 @@ def test_code_is_as_readable_as_the_derivation():
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_text_says_everything(name):
-    arm = library_robot(name)
+    arm = robot(name)
     derivation = inverse_derivation(arm)
     text = derivation.text()
     assert max(map(len, text.splitlines())) <= 110
@@ -211,7 +211,7 @@ class _Tags(HTMLParser):
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_a_page_has_every_step_with_its_mathematics_and_figures(name):
-    derivation = inverse_derivation(library_robot(name))
+    derivation = inverse_derivation(robot(name))
     page = derivation.html()
     tags = _Tags()
     tags.feed(page)
@@ -237,7 +237,7 @@ def test_a_page_has_every_step_with_its_mathematics_and_figures(name):
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_latex_is_balanced_and_converts_without_loss(name):
-    derivation = inverse_derivation(library_robot(name))
+    derivation = inverse_derivation(robot(name))
     latex = latex_document(derivation.latex(), name)
     assert latex.count("{") == latex.count("}") and latex.count("$") % 2 == 0
     assert latex.count(r"\begin{align*}") == latex.count(r"\end{align*}") > 0
@@ -247,7 +247,7 @@ def test_latex_is_balanced_and_converts_without_loss(name):
 @pytest.mark.parametrize("name", ["puma560", "ur5", "stanford", "al5d", "cart_pendulum"])
 def test_sympys_solutions_satisfy_sympys_equations(name):
     """Evaluated at one pose of the arm, in sympy: definitions and solutions in the order of the steps."""
-    arm = library_robot(name)
+    arm = robot(name)
     derivation = inverse_derivation(arm)
     objects, chain = derivation.sympy(), derivation.chain
     T = world_to_tool(arm, random_states(arm, 1, seed=8)[0])

@@ -23,8 +23,14 @@ from dhkit.symbolic import inverse_derivation, symbolic_kinematics
 from dhkit.symbolic.inverse.forms import FORMS, lemmas
 from dhkit.symbolic.inverse.steps import names_in
 from dhkit.verification import random_states
-from ik_checks import FEW_JOINTS, SIX_JOINTS
-from random_arms import elbow_arms, few_joint_arms, slide_arms, three_parallel_arms
+from ik_checks import FEW_JOINTS, FIVE_JOINTS, SIX_JOINTS, robot
+from random_arms import (
+    elbow_arms,
+    few_joint_arms,
+    five_joint_arms,
+    slide_arms,
+    three_parallel_arms,
+)
 
 CLOSES = 1e-12
 """Of forward kinematics, lengths over the reach, where no sine or root is below NEAR."""
@@ -33,7 +39,7 @@ NEAR = 1e-3
 """Singularity measure below which textbook formulas lose digits."""
 JOINTS = 1e-12
 """rad and shares of ``scale``: difference from the kernels, times the smallest measure of a branch."""
-LIBRARY = [*SIX_JOINTS, *FEW_JOINTS]
+LIBRARY = [*SIX_JOINTS, *FIVE_JOINTS, *FEW_JOINTS]
 
 
 def scale(arm, T):
@@ -131,7 +137,7 @@ def positions_close(arm, q, T, derivation):
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_every_robot_of_the_library_is_derived_proved_and_held_to_the_kernels(law, name):
-    arm = library_robot(name)
+    arm = robot(name)
     derivation = inverse_derivation(arm)
     assert derivation.family.name == classify(arm).name
     proof = derivation.prove(law.samples(5000), seed=1)
@@ -153,7 +159,7 @@ def special_states(arm, count, seed):
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_solutions_at_singular_poses_reach_them(law, name):
-    arm = library_robot(name)
+    arm = robot(name)
     derivation = inverse_derivation(arm)
     q = special_states(arm, law.samples(20_000), seed=3)
     T = world_to_tool(arm, q)
@@ -202,6 +208,13 @@ def test_any_arm_of_the_urs_family(law, arm):
 @settings(max_examples=sample_size(1000, quick=8))
 @given(arm=slide_arms())
 def test_any_arm_of_the_stanfords_family(law, arm):
+    check_family(law, arm)
+
+
+@pytest.mark.slow
+@settings(max_examples=sample_size(1000, quick=8))
+@given(arm=five_joint_arms())
+def test_any_arm_of_five_joints(law, arm):
     check_family(law, arm)
 
 
@@ -296,7 +309,7 @@ def test_a_lemmas_solution_is_what_is_evaluated(form):
 
 @pytest.mark.parametrize("name", LIBRARY)
 def test_nothing_is_used_before_it_is_found(name):
-    derivation = inverse_derivation(library_robot(name))
+    derivation = inverse_derivation(robot(name))
     chain = derivation.chain
     known = {*chain.lengths, *(chain.names[k] for k in chain.names if k.startswith(("p", "r")))}
     known |= set(chain.values)

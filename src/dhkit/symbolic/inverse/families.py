@@ -16,6 +16,8 @@ from dhkit.symbolic.inverse.steps import Workbench
 from dhkit.symbolic.inverse.turning_planes import (
     elbow,
     elbow_fits,
+    five_joints,
+    five_joints_fit,
     pan_tilt,
     pan_tilt_fits,
     parallel_fits,
@@ -48,7 +50,8 @@ class Derivable:
     derive
         Function that writes its steps on a workbench.
     undoes_tool
-        Whether the constant transform after the last joint is divided out of the pose; arms that reach every pose.
+        Whether the constant transform after the last joint is divided out of the pose; arms with a wrist, or of five
+        joints.
     aims
         Whether the derivation only points the tool at the pose's origin.
     """
@@ -93,6 +96,14 @@ FAMILIES = (
         "axes 2, 3 and 4 parallel, 5 and 6 meet",
         parallel_fits,
         three_parallel,
+        True,
+    ),
+    Derivable(
+        "five_joints",
+        ("RRRRR",),
+        "a turntable, axes 2, 3 and 4 parallel, axis 5 across them",
+        five_joints_fit,
+        five_joints,
         True,
     ),
     Derivable(

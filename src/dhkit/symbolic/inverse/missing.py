@@ -9,7 +9,6 @@ from dhkit.symbolic.ring import Element
 
 _ANY_ARM = "use arm.ik_numeric"
 _SIX_OR_SEVEN = "use arm.ik, which finds its solutions without, or arm.ik_numeric"
-_FIVE = "use arm.ik where arm.family says closed form, or arm.ik_numeric"
 
 
 def why_not(chain: ExactChain) -> str:
@@ -17,9 +16,6 @@ def why_not(chain: ExactChain) -> str:
     n = chain.n
     kinds = chain.description.kinds
     count = f"{n}R" if set(kinds) == {"R"} else kinds
-    if count == "5R":
-        # The closed form of a turntable with three parallel joints and a roll is not derived here.
-        return f"no derivation is known for these 5R axes: {_missing(chain)}; {_FIVE}"
     instead = _SIX_OR_SEVEN if count in ("6R", "7R") else _ANY_ARM
     return f"no closed form is known for these {count} axes: {_missing(chain)}; {instead}"
 

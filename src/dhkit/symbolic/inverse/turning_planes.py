@@ -1,10 +1,10 @@
-"""Steps of arms whose first joint turns a plane: PUMA, Stanford and Universal Robots, turntables, pan and tilt."""
+"""Steps of arms whose first joint turns a plane: PUMA, Stanford, Universal Robots, five joints, turntables."""
 
 from __future__ import annotations
 
 import math
 
-from dhkit.symbolic.exact.transforms import rotation
+from dhkit.symbolic.exact.transforms import rotation, translation
 from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.inverse.forms import Direction as Directed, Turned
 from dhkit.symbolic.inverse.regions import (
@@ -28,7 +28,7 @@ from dhkit.symbolic.inverse.relations import (
     relative_sense,
     sum_text,
 )
-from dhkit.symbolic.inverse.steps import DerivationStep, Workbench
+from dhkit.symbolic.inverse.steps import Condition, DerivationStep, Workbench
 from dhkit.symbolic.inverse.wrists import turn_parallel_wrist, turn_spherical_wrist
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
@@ -252,6 +252,77 @@ def _reach_axis_4(
     links_2_and_3 = chain.part(2, 3)
     known_angle = element_array([links_2_and_3[0, 0], links_2_and_3[1, 0]])
     remaining_angle(bench, 4, known_angle, senses, "Joint 4 turns what remains of phi.")
+
+
+def five_joints_fit(chain: ExactChain) -> bool:
+    """Return whether axes 2, 3 and 4 are parallel on a turntable, and axis 5 is at right angles to them."""
+    if not (perpendicular(chain, 1) and parallel(chain, 2) and parallel(chain, 3)):
+        return False
+    return perpendicular(chain, 4) and not chain.a[1].is_zero and not chain.a[2].is_zero
+
+
+def five_joints(bench: Workbench) -> None:
+    """Write the steps of a turntable with three parallel joints and a last one that rolls the tool."""
+    chain = bench.chain
+    T = bench.T
+    along = chain.last[2, 3]
+    who = "the point of axis 5 next to the tool"
+    foot = T[:3, 3]
+    if not along.is_zero:
+        # f = p + F_z a, with a the direction of axis 5
+        place = T[:3, 3] + T[:3, 2] * along
+        definitions, foot = bench.define_all(wx=place[0], wy=place[1], wz=place[2])
+        bench.add(
+            DerivationStep(
+                "The point of axis 5 next to the tool",
+                f"It is {along} along axis 5 from frame 5, and joint 5 leaves it in place.",
+                definitions,
+            )
+        )
+    beyond = translation(chain.ring, 2, along)
+    plane = turn_the_plane(bench, foot, origin(chain.part(2, 4) @ chain.joint(5) @ beyond), who)
+
+    # Axis 5 is at right angles to axes 2, 3 and 4, which turn it by phi.
+    axis = into_axis_2(bench, T[:3, 2])
+    bench.conditions.append(
+        Condition(
+            "Axis 5 stays in the plane that joint 1 turns: axis 5 of the pose has to lie in it.",
+            axis[2],
+            chain.ring.zero,
+        )
+    )
+    sense = relative_sense(chain, 2) * relative_sense(chain, 3)
+    senses = _parallel_senses(chain)
+    links_2_to_4 = chain.part(2, 4)
+    phi = bench.phi(links_2_to_4[0, 0], links_2_to_4[1, 0], senses)
+    definitions, (ax, ay) = bench.define_all(ax=axis[0], ay=axis[1])
+    # Without phi, axis 5 is at (0, V) in the frame of axis 2: (ax, ay) = V (-sin(phi), cos(phi)).
+    V = -sense * chain.alpha[3][1]
+    bench.add(
+        DerivationStep(
+            "phi",
+            f"{sum_text(senses)} Axis 5 is at right angles to axes 2, 3 and 4, which turn it by phi: it is seen at "
+            "(ax, ay) in the plane.",
+            definitions,
+            Directed(phi, {"k": chain.ring.one, "X": V * ay, "Y": -V * ax}),
+        )
+    )
+    lever = origin(chain.link(4) @ chain.joint(5) @ beyond)
+    _reach_axis_4(bench, plane, lever, sense, senses)
+
+    # The y axis before joint 5 turns is that of the parallel axes: n and o have s5 and c5 along it.
+    n_and_o = [into_axis_2(bench, T[:3, k])[2] for k in range(2)]
+    definitions, (nz, oz) = bench.define_all(nz=n_and_o[0], oz=n_and_o[1])
+    along_y = sense * chain.alpha[3][1]
+    bench.add(
+        DerivationStep(
+            "theta5",
+            "nz and oz are the components of the tool's x and y axes along axis 2. Axis 5 is at right angles to it, so "
+            "that they are sine and cosine of theta5, up to their sign.",
+            definitions,
+            Directed(bench.unknown(5), {"k": chain.ring.one, "X": along_y * oz, "Y": along_y * nz}),
+        )
+    )
 
 
 def turntable_fits(chain: ExactChain) -> bool:
