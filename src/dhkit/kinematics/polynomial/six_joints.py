@@ -25,6 +25,10 @@ _FOUND = 1e-5
 """Largest difference, rad, of a solution from the joint values that made the pose."""
 _MISSED_COUNTS = 4
 """Number of poses with an incomplete set of solutions that one missed solution counts as."""
+_WAYS = 3
+"""Number of eliminations that are tried for an arm of any geometry."""
+_MANY = 1e6
+"""More than all failures of an elimination."""
 _DISPLACEMENTS = (1e-4, 1e-3, 1e-2)
 """Sizes of displacements, rad and share of the reach: the roots at a double root's pose are then 1e-2 apart."""
 _STARTS = 64
@@ -45,42 +49,73 @@ class SixJoints:
         """The arm as one with parallel axes 2 and 3; None if it is not of that kind."""
         return TwoParallel.fit(Axes.of(self.description))
 
-    @cached_property
+    @property
     def elimination(self) -> TwoParallel | CompiledGeneral:
-        """The way in which joints are eliminated.
+        """The way in which joints are eliminated first."""
+        return self._ways[0]
 
-        Of those for any geometry it is the one that finds most poses of random joint values, and most of them in full.
+    @cached_property
+    def _ways(self) -> list[TwoParallel | CompiledGeneral]:
+        """The ways to eliminate joints, the best one first; a later one takes the poses at which those before fail.
+
+        Of those for any geometry the first finds most poses of random joint values, and most of them in full; the next
+        one finds most of the others in full. They fail at different poses, for their polynomials are in other joints.
         """
+        variants = General.of(self.description).variants()
         if self.two_parallel is not None:
-            return self.two_parallel
+            in_joint_2 = next(x for x in variants if x.joint == 2 and not x.is_reversed)
+            return [self.two_parallel, CompiledGeneral(in_joint_2)]
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, 6))
         poses = forward_kinematics(self.description, q).reshape(-1, 16)
-        variants = General.of(self.description).variants()
-        failures = [self._failures(variant, q, poses) for variant in variants]
-        return CompiledGeneral(variants[int(np.argmin(failures))])
+        failures = np.array([self._failures(variant, q, poses) for variant in variants])
+        chosen: list[int] = []
+        are_left = np.ones(_TRIALS, dtype=bool)
+        while len(chosen) < _WAYS:
+            score = failures[:, are_left].sum(axis=1) + failures.sum(axis=1) / _MANY
+            score[chosen] = np.inf
+            chosen.append(int(np.argmin(score)))
+            are_left &= failures[chosen[-1]] > 0
+        return [CompiledGeneral(variants[k]) for k in chosen]
 
-    def _failures(self, elimination: Elimination, q: Array, poses: Array) -> int:
-        """Return how badly an elimination fails at poses that were made of joint values (N, 6)."""
+    def _failures(self, elimination: Elimination, q: Array, poses: Array) -> NDArray[np.intp]:
+        """Return how badly an elimination fails at poses (N, 16) that were made of joint values (N, 6), shape (N,)."""
         found = solve(self.description, elimination, poses)
         apart = 2 * np.abs(np.sin((found.q - q[found.owner]) / 2)).max(axis=1)
         is_found = np.zeros(len(poses), dtype=bool)
         is_found[found.owner[apart < _FOUND]] = True
-        return int(_MISSED_COUNTS * np.sum(~is_found) + np.sum(~found.is_complete))
+        return np.asarray(_MISSED_COUNTS * ~is_found + ~found.is_complete)
 
     def __call__(self, poses: Array) -> Found:
         """Return the solutions of poses, shape (N, 16), with orthonormal rotations, m.
 
-        Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more from the
-        solutions of poses beside them, where the roots lie apart, and then by iteration from random starts.
+        Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more by
+        eliminating other joints, then from the solutions of poses beside them, where the roots lie apart, and then by
+        iteration from random starts.
         """
         found = solve(self.description, self.elimination, poses)
         rows = np.flatnonzero(~found.is_complete)
+        for way in self._ways[1:]:
+            if len(rows):
+                found = self._by_another_way(found, way, poses, rows)
+                rows = rows[~found.is_complete[rows]]
         if len(rows):
             found = _with(found, rows, *self._from_beside(poses[rows]))
             rows = rows[~found.is_complete[rows]]
         if len(rows):
             found = _with(found, rows, *self._iterated(poses[rows], found, rows))
         return found
+
+    def _by_another_way(
+        self, found: Found, way: Elimination, poses: Array, rows: NDArray[np.intp]
+    ) -> Found:
+        """Return what is found, with the solutions of poses ``rows`` (M,) by another elimination added."""
+        others = solve(self.description, way, poses[rows])
+        merged = _with(found, rows, others.q, others.owner)
+        # Where that one is complete, it knows the number of solutions.
+        is_known = others.is_complete
+        merged.expected[rows[is_known]] = others.expected[is_known]
+        merged.is_exact[rows[is_known]] = True
+        return merged
 
     def _from_beside(self, poses: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return solutions (K, 6) of poses (M, 16) by Newton's method from those of displaced poses, and their poses.
@@ -183,4 +218,11 @@ def _with(found: Found, rows: NDArray[np.intp], more: Array, owner: NDArray[np.i
     q = np.concatenate([found.q[~changes], q])
     owners = np.concatenate([found.owner[~changes], owners])
     order = np.argsort(owners, kind="stable")
-    return replace(found, q=q[order], owner=owners[order], is_delicate=is_delicate)
+    return replace(
+        found,
+        q=q[order],
+        owner=owners[order],
+        expected=found.expected.copy(),
+        is_exact=found.is_exact.copy(),
+        is_delicate=is_delicate,
+    )
