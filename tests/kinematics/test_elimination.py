@@ -247,6 +247,16 @@ def test_a_missing_solution_is_not_called_complete(law):
         assert not (missed and found.complete)
 
 
+@pytest.mark.law
+@pytest.mark.parametrize("name", ALL)
+def test_nearly_all_poses_are_complete(name, law):
+    """Where some roots of one polynomial nearly coincide, those of another one lie apart."""
+    arm = ALL[name]
+    q = np.random.default_rng(9).uniform(-np.pi, np.pi, (law.samples(20_000, 300), 6))
+    found = six_joints(arm.description)(arm.fk(q).reshape(-1, 16))
+    law.holds("share of poses that are not", float(np.mean(~found.is_complete)), 0.005, name)
+
+
 @pytest.mark.parametrize("kinds", ["RRRRR", "RRPRRR", "RRRRRRRR"])
 def test_other_arms_are_refused(kinds):
     arm = from_dh([(0, 0.1 * (k + 1), 0.2, 0.3 * k + 0.1) for k in range(len(kinds))], kinds=kinds)
@@ -417,12 +427,13 @@ def test_few_poses_are_solved_as_each_alone(name):
 
 
 @pytest.mark.law
-@pytest.mark.parametrize("name", SIX)
+@pytest.mark.parametrize("name", ALL)
 def test_sure_poses_of_a_batch_are_solved_as_with_care(name, law):
     limit = np.radians([170.0, 120.0, 150.0, 200.0, 120.0, 360.0])
-    arm = SIX[name].with_limits(lower=-limit, upper=limit)
+    arm = ALL[name].with_limits(lower=-limit, upper=limit)
     description = arm.description
-    for one in elimination_kernels(description):
+    programs = [way.pose_kernel for way in six_joints(description).ways]
+    for one in [*elimination_kernels(description), *programs]:
         one.compile()
     q = np.random.default_rng(13).uniform(-np.pi, np.pi, (law.samples(20_000, quick=500), 6))
     q[::10, 4] = 1e-5
@@ -471,15 +482,18 @@ def test_single_calls_leave_other_arguments_to_the_ordinary_way():
 def test_compiled_eliminations_call_no_missing_solution_complete(name, law):
     """Some arms have ways whose polynomial is always 0, or whose roots are always double."""
     description = from_dh(SPECIAL[name])
-    elimination = six_joints(description).elimination
-    for one in elimination.kernels:
-        one.compile()
     q = np.random.default_rng(2).uniform(-np.pi, np.pi, (law.samples(2_000, quick=100), 6))
     T = Arm(description).fk(q).reshape(-1, 16)
-    found = solve(description, elimination, T)
-    near = np.abs(np.angle(np.exp(1j * (found.q - q[found.owner])))).max(axis=1) < 1e-5
-    is_missed = ~np.isin(np.arange(len(q)), found.owner[near])
-    law.holds("missed and said complete", int(np.sum(is_missed & found.is_complete)), 0, name)
+    first, *others = six_joints(description).ways
+    for elimination in (first, *others):
+        for one in elimination.kernels:
+            one.compile()
+        found = solve(description, elimination, T)
+        near = np.abs(np.angle(np.exp(1j * (found.q - q[found.owner])))).max(axis=1) < 1e-5
+        is_missed = ~np.isin(np.arange(len(q)), found.owner[near])
+        # Of the other ways, only solutions that lie at their roots count.
+        is_claimed = found.is_complete & (found.is_settled | (elimination is first))
+        law.holds("missed and said complete", int(np.sum(is_missed & is_claimed)), 0, name)
 
 
 @pytest.mark.parametrize("offset", [0.1, 0.02, 0.001])

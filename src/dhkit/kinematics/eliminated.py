@@ -34,6 +34,8 @@ from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
 _TOGETHER = 256
 """Poses whose roots are held together, some 500 KB."""
+_FURTHER_WAYS = 2
+"""Number of further eliminations whose programs are tried before poses are solved with care."""
 _OUT_OF_LIMITS = np.uint8(IKFlag.out_of_limits)
 _CLUSTER = 0.05
 """Distance of singular solutions, rad, below which some of them may be false."""
@@ -87,16 +89,24 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
 
 def _solved(description: Description, poses: Array) -> IKSolutions:
     """Return the solutions of matrices (N, 4, 4)."""
-    arm = six_joints(description).elimination
+    first, *others = six_joints(description).ways
     # Interpreted, the program takes longer than what is saved; for 0 items nothing is counted.
-    if has_curves(description) or not arm.pose_kernel.is_compiled_for(0):
+    if has_curves(description) or not first.pose_kernel.is_compiled_for(0):
         return _solved_with_care(description, poses)
-    sure = _SurePoses.of(description, arm, poses.reshape(-1, 16))
+    goals = poses.reshape(-1, 16)
+    sure = _SurePoses.of(description, first, goals)
     rows = np.flatnonzero(sure.counts == 0)
+    for way in others[:_FURTHER_WAYS]:
+        # Where roots of one polynomial nearly coincide, those of another one lie apart.
+        if len(rows) and way.pose_kernel.is_compiled_for(len(rows)):
+            more = _SurePoses.of(description, way, goals[rows])
+            sure.q[rows] = more.q
+            sure.flags[rows] = more.flags
+            sure.counts[rows] = more.counts
+            rows = rows[more.counts == 0]
     if not len(rows):
         return sure.solutions(description)
-    others = _solved_with_care(description, poses[rows])
-    return sure.solutions(description, rows, others)
+    return sure.solutions(description, rows, _solved_with_care(description, poses[rows]))
 
 
 @dataclass(frozen=True, eq=False)

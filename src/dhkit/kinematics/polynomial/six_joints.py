@@ -25,8 +25,6 @@ _FOUND = 1e-5
 """Largest difference, rad, of a solution from the joint values that made the pose."""
 _MISSED_COUNTS = 4
 """Number of poses with an incomplete set of solutions that one missed solution counts as."""
-_WAYS = 3
-"""Number of eliminations that are tried for an arm of any geometry."""
 _MANY = 1e6
 """More than all failures of an elimination."""
 _DISPLACEMENTS = (1e-4, 1e-3, 1e-2)
@@ -52,10 +50,10 @@ class SixJoints:
     @property
     def elimination(self) -> TwoParallel | CompiledGeneral:
         """The way in which joints are eliminated first."""
-        return self._ways[0]
+        return self.ways[0]
 
     @cached_property
-    def _ways(self) -> list[TwoParallel | CompiledGeneral]:
+    def ways(self) -> list[TwoParallel | CompiledGeneral]:
         """The ways to eliminate joints, the best one first; a later one takes the poses at which those before fail.
 
         Of those for any geometry the first finds most poses of random joint values, and most of them in full; the next
@@ -63,14 +61,13 @@ class SixJoints:
         """
         variants = General.of(self.description).variants()
         if self.two_parallel is not None:
-            in_joint_2 = next(x for x in variants if x.joint == 2 and not x.is_reversed)
-            return [self.two_parallel, CompiledGeneral(in_joint_2)]
+            return [self.two_parallel, *(CompiledGeneral(x) for x in variants if x.joint == 2)]
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, 6))
         poses = forward_kinematics(self.description, q).reshape(-1, 16)
         failures = np.array([self._failures(variant, q, poses) for variant in variants])
         chosen: list[int] = []
         are_left = np.ones(_TRIALS, dtype=bool)
-        while len(chosen) < _WAYS:
+        while len(chosen) < len(variants):
             score = failures[:, are_left].sum(axis=1) + failures.sum(axis=1) / _MANY
             score[chosen] = np.inf
             chosen.append(int(np.argmin(score)))
@@ -94,7 +91,7 @@ class SixJoints:
         """
         found = solve(self.description, self.elimination, poses)
         rows = np.flatnonzero(~found.is_complete)
-        for way in self._ways[1:]:
+        for way in self.ways[1:]:
             if len(rows):
                 found = self._by_another_way(found, way, poses, rows)
                 rows = rows[~found.is_complete[rows]]
@@ -111,8 +108,8 @@ class SixJoints:
         """Return what is found, with the solutions of poses ``rows`` (M,) by another elimination added."""
         others = solve(self.description, way, poses[rows])
         merged = _with(found, rows, others.q, others.owner)
-        # Where that one is complete, it knows the number of solutions.
-        is_known = others.is_complete
+        # Where that one is complete, and its solutions lie at its roots, it knows their number.
+        is_known = others.is_complete & others.is_settled
         merged.expected[rows[is_known]] = others.expected[is_known]
         merged.is_exact[rows[is_known]] = True
         return merged

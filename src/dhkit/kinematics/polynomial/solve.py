@@ -17,6 +17,8 @@ _CHUNK = 1_024
 """Poses that are solved together; their arrays take some 10 MB."""
 CLOSES = 1e-13
 """Error of starts that need no iteration: share of the reach, and rad."""
+_AT_ROOT = 1e-6
+"""Error of joint values that belong to their root: share of the reach, and rad."""
 INEXACT = 1e-6
 """Largest coefficient beyond degree 8, relative to the others, of a polynomial that is trusted."""
 SAME_ANGLE = 1e-6
@@ -78,6 +80,8 @@ class Found:
     """Whether the polynomial is known well enough for that number, shape (N,)."""
     is_delicate: NDArray[np.bool_]
     """Whether a solution may be singular, shape (N,): two roots nearly coincide, or a solution is not at its root."""
+    is_settled: NDArray[np.bool_]
+    """Whether each real root has a solution from which iteration moved it but little, shape (N,)."""
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:
@@ -102,7 +106,7 @@ def solve(description: Description, elimination: Elimination, poses: Array) -> F
     q = [np.empty((0, 6))]
     owner = [np.empty(0, dtype=np.intp)]
     expected = np.zeros(len(poses), dtype=np.intp)
-    is_exact, is_delicate = np.zeros((2, len(poses)), dtype=bool)
+    is_exact, is_delicate, is_settled = np.zeros((3, len(poses)), dtype=bool)
     for begin in range(0, len(poses), _CHUNK):
         some = slice(begin, begin + _CHUNK)
         found = _solve(description, elimination, poses[some])
@@ -111,7 +115,10 @@ def solve(description: Description, elimination: Elimination, poses: Array) -> F
         expected[some] = found.expected
         is_exact[some] = found.is_exact
         is_delicate[some] = found.is_delicate
-    return Found(np.concatenate(q), np.concatenate(owner), expected, is_exact, is_delicate)
+        is_settled[some] = found.is_settled
+    return Found(
+        np.concatenate(q), np.concatenate(owner), expected, is_exact, is_delicate, is_settled
+    )
 
 
 def _solve(description: Description, elimination: Elimination, poses: Array) -> Found:
@@ -133,6 +140,7 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
     q = q[closed]
     owner = found.owner[closed]
     root = found.root[closed]
+    is_at_root = found.error[closed] < _AT_ROOT
     is_doubtful[owner[1:][root[1:] == root[:-1]]] = True
     rows = np.flatnonzero(is_doubtful[owner])
     if len(rows):
@@ -140,9 +148,12 @@ def _solve(description: Description, elimination: Elimination, poses: Array) -> 
         is_one[rows] = are_distinct(q[rows], owner[rows])
         q = q[is_one]
         owner = owner[is_one]
+        is_at_root = is_at_root[is_one]
     # What Newton's method moved may be singular as well.
     is_delicate = found.is_delicate | is_moved
-    return Found(q, owner, found.expected, found.error_of_polynomial < INEXACT, is_delicate)
+    is_exact = found.error_of_polynomial < INEXACT
+    is_settled = np.bincount(owner[is_at_root], minlength=len(poses)) >= found.expected
+    return Found(q, owner, found.expected, is_exact, is_delicate, is_settled)
 
 
 def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:
