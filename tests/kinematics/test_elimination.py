@@ -16,6 +16,7 @@ from dhkit.errors import ModelError
 from dhkit.kinematics import classify, inverse_kinematics, solve_numerically
 from dhkit.kinematics.eliminated import (
     _solved_with_care,
+    _SurePoses,
     elimination_kernels,
     solve_by_elimination,
 )
@@ -456,6 +457,30 @@ def test_sure_poses_of_a_batch_are_solved_as_with_care(name, law):
     again = solve_by_elimination(description, T[:6].reshape(2, 3, 4, 4))
     assert again.q.shape[:2] == (2, 3) and again.status.shape == (2, 3)
     assert solve_by_elimination(description, np.empty((0, 4, 4))).q.shape[0] == 0
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", [*ALL, *SPECIAL])
+def test_different_eliminations_find_the_same_solutions(name, law):
+    """Their polynomials are in different joints: of poses that two of them are sure of, both find all solutions."""
+    description = ALL[name].description if name in ALL else from_dh(SPECIAL[name])
+    q = np.random.default_rng(21).uniform(-np.pi, np.pi, (law.samples(20_000, quick=100), 6))
+    q[::7, 4] *= 1e-5
+    q[::11, 2] *= 1e-4
+    T = Arm(description).fk(q)
+    largest = np.zeros(len(q), dtype=int)
+    found = []
+    for way in six_joints(description).ways:
+        way.pose_kernel.compile()
+        sure = _SurePoses.of(description, way, T.reshape(-1, 16))
+        is_sure = sure.counts > 0
+        # At two singularities at once solutions within 1e-4 close to rounding.
+        missed = distance(sure, q) > 1e-3
+        law.holds("sure, and missed", int(np.sum(is_sure & missed)), 0, name)
+        found.append(sure.counts)
+        largest = np.maximum(largest, sure.counts)
+    unequal = sum(int(np.sum((counts > 0) & (counts != largest))) for counts in found)
+    law.holds("poses with other numbers of solutions", unequal, 0, name)
 
 
 def test_single_calls_leave_other_arguments_to_the_ordinary_way():

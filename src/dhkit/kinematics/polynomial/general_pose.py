@@ -363,8 +363,9 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
         "angle": angle,
         **{symbol.name(): symbol for symbol in of_root},
     }
+    place = 5 - arm.i if arm.is_reversed else arm.i
     graph = known_solutions(
-        parameters, inputs, (is_tried, is_real), q, error, closeness, closeness > 0.0
+        parameters, inputs, (is_tried, is_real), q, error, closeness, closeness > 0.0, place
     )
     shared = ("goal", "motion", "six", "reflections", "constant", "R")
     return PipelineStep(graph, ROOTS, shared={name: name for name in shared})

@@ -58,6 +58,10 @@ BESIDE = 1.0
 COINCIDES = 2.0
 """Another root is nearer than NEAR_ROOTS, so that the solution may be singular; or than NEAREST_ROOTS, so that both may
 be found as one."""
+_ON_CIRCLE = 1e-6
+"""Imaginary part of a root, rad, above which it is not surely real."""
+_AT_ROOT = 1e-5
+"""Half the distance of a solution from its root, rad, above which it may be that of another root."""
 _COEFFICIENTS = 2 * DEGREE + 1
 _TOGETHER = 8
 """Numbers whose reciprocals are computed together."""
@@ -156,6 +160,9 @@ def _angles(parameters: _SX) -> PipelineStep:
     )
 
     is_tried = angle < BEYOND
+    # The root 1 / conj(z) is at the same angle: both lead to one solution.
+    is_double = ca.logic_and(is_tried, height > _ON_CIRCLE)
+    closeness = ca.if_else(is_double, COINCIDES, closeness)
     inputs = {
         "parameters": parameters,
         "numbers": numbers,
@@ -185,6 +192,7 @@ def known_solutions(
     error: _SX,
     closeness: _SX,
     is_delicate: _SX,
+    place: int,
     more: Sequence[_SX] = (),
 ) -> Graph:
     """Return the program of the last step: joint values at roots, and what is known of them.
@@ -194,17 +202,22 @@ def known_solutions(
     parameters
         Symbols of the parameters; the last twelve are lower and upper limits.
     inputs
-        Inputs of the step, besides ``is_tried`` and ``is_real``.
+        Inputs of the step, the root's ``angle`` among them, rad, besides ``is_tried`` and ``is_real``.
     of_root
         Symbols of ``is_tried`` and ``is_real``.
     q, error
         Joint values, 6 x 1, rad, and their error.
     closeness, is_delicate
         Whether another root is near, and whether the solution may be singular.
+    place
+        Index of the joint that the polynomial is in.
     more
         Further details, of which none is above 0 at a root that has just one solution.
     """
     is_tried, is_real = of_root
+    # Iteration from joint values that are not those of the root may lead to the solution of another root.
+    away = ca.fabs(ca.sin((q[place] - inputs["angle"]) / 2.0))
+    is_delicate = ca.logic_or(is_delicate, ca.logic_not(away < _AT_ROOT))
     has_more = sum((ca.if_else(x > 0.0, 1.0, 0.0) for x in more), ca.SX(0.0)) > 0.0
     is_alone = ca.logic_not(ca.logic_or(is_delicate, has_more))
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)

@@ -114,6 +114,7 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
         error,
         closeness,
         is_delicate,
+        0,
         ca.vertsplit(also),
     )
     return PipelineStep(graph, ROOTS, shared={"goal": "goal"})
