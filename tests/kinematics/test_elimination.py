@@ -548,6 +548,28 @@ def test_of_nearly_spherical_wrists_no_solution_is_missed_in_silence(offset, law
     law.holds("share that is missed", float(missed.mean()), 0.01, offset)
 
 
+@pytest.mark.law
+def test_beside_a_curve_of_solutions_none_is_missed_in_silence(law):
+    """Where four axes are nearly parallel, iteration closes at false solutions beside the curve that they would have."""
+    arm = GENERAL["three parallel axes, offset wrist"]
+    rng = np.random.default_rng(5)
+    missed = 0
+    for _ in range(law.samples(1_000, 20)):
+        q = rng.uniform(-3.0, 3.0, 6)
+        q[4] = rng.choice([0.0, np.pi]) + rng.choice([-1, 1]) * 10 ** rng.uniform(-13, -2)
+        T = arm.fk(q)
+        found = arm.ik(T)
+        if not found.complete:
+            continue
+        starts = rng.uniform(-np.pi, np.pi, (100, 6))
+        search = arm.ik_numeric(np.broadcast_to(T, (100, 4, 4)), starts, limits=False)
+        others = search.q[search.valid]
+        others = others[regularity(arm, others) > REGULAR]
+        apart = np.abs(np.angle(np.exp(1j * (others[:, None] - found.q[found.valid])))).max(axis=-1)
+        missed += (apart.min(axis=1) > 1e-4).any()
+    law.holds("complete without regular solutions", missed, 0)
+
+
 def test_clusters_of_singular_solutions_are_not_called_complete():
     """Where many roots coincide, Newton's method closes at false solutions beside the true one."""
     right = np.pi / 2

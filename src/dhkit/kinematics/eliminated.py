@@ -37,6 +37,8 @@ _TOGETHER = 256
 _FURTHER_WAYS = 2
 """Number of further eliminations whose programs are tried before poses are solved with care."""
 _OUT_OF_LIMITS = np.uint8(IKFlag.out_of_limits)
+_EXACTLY = 1e-7
+"""Smallest singular value of a solution that is singular to rounding."""
 _CLUSTER = 0.05
 """Distance of singular solutions, rad, below which some of them may be false."""
 
@@ -218,8 +220,9 @@ def _solved_with_care(description: Description, poses: Array) -> IKSolutions:
     B = table.shape[1]
     is_delicate = np.zeros(posed.size, dtype=bool)
     is_delicate[rows] = found.is_delicate
-    flags = _singular_flags(description, table, is_delicate)
-    is_known = found.is_complete & ~_have_clusters(table, flags)[rows]
+    flags, is_nearly_curve = _singular_flags(description, table, is_delicate)
+    are_false = is_nearly_curve | _have_clusters(table, flags)
+    is_known = found.is_complete & ~are_false[rows]
     none_exist = np.zeros(posed.size, dtype=bool)
     if not has_curves(description):
         none_exist[rows] = is_known & (found.counts == 0)
@@ -261,18 +264,25 @@ def elimination_kernels(description: Description) -> list[Kernel]:
 
 def _singular_flags(
     description: Description, q: Array, is_delicate: NDArray[np.bool_]
-) -> NDArray[np.uint8]:
-    """Return the flags of singular solutions (N, B, n) of delicate poses (N,), shape (N, B)."""
+) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """Return the flags of singular solutions (N, B, n) of delicate poses (N,), shape (N, B), and nearly curves, (N,).
+
+    Near a curve of solutions, iteration closes at points beside it: two of them or more are nearly exactly singular.
+    """
     flags = np.zeros(q.shape[:2], dtype=np.uint8)
+    is_nearly_curve = np.zeros(len(q), dtype=bool)
     if not is_delicate.any():
-        return flags
+        return flags, is_nearly_curve
     is_asked = is_delicate[:, None] & ~np.isnan(q).any(axis=-1)
     J = jacobian(description, q[is_asked])
     # Without units: velocities over the reach.
     J[:, :3] /= Axes.of(description).scale
     is_singular = has_small_singular_value(J, SINGULAR)
     flags[is_asked] = np.where(is_singular, np.uint8(IKFlag.singular), np.uint8(0))
-    return flags
+    is_exactly = np.zeros(q.shape[:2], dtype=bool)
+    is_exactly[flags > 0] = has_small_singular_value(J[is_singular], _EXACTLY)
+    is_nearly_curve = np.count_nonzero(is_exactly, axis=1) > 1
+    return flags, is_nearly_curve
 
 
 def _have_clusters(q: Array, flags: NDArray[np.uint8]) -> NDArray[np.bool_]:

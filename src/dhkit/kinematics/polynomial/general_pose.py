@@ -22,7 +22,7 @@ import casadi as ca
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import BASE_DAMPING, orthonormal_goal
 from dhkit.kinematics.newton_program import levenberg_step, pose_error
-from dhkit.kinematics.polynomial.pivots import eliminated, not_zero
+from dhkit.kinematics.polynomial.pivots import eliminated, newton_step, not_zero
 from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, root_steps
 from dhkit.kinematics.polynomial.trigonometric import ROOTS, SAMPLES
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
@@ -46,8 +46,8 @@ _REFLECTIONS = sum(_EQUATIONS - k for k in range(_FAR))
 """Number of entries of all vectors of reflections: each is one shorter than the one before."""
 _FIRST_ANGLE = 0.1
 """First angle at which the polynomial is evaluated, rad."""
-_POLISHING_STEPS = 2
-"""Newton steps from the elimination's solution, whose error is some 1e-9 rad, to rounding."""
+_LARGEST_STEP = 1e-3
+"""Larger steps of Newton's method, rad, are not taken."""
 _SINGULAR = 1e-11
 """Ratio of the smallest pivot to the largest one of a matrix that is singular up to rounding."""
 _TINY = 1e-300
@@ -351,7 +351,8 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
     near = factors @ _products(second, third)
     a, b = _far_angles(near - constant, reflections, R)
     q = _joints(arm, motion, {arm.i: angle, arm.i + 1: second, arm.i + 2: third}, (a, b))
-    q, error = _polished(parameters, arm, goal, q)
+    q, error, is_regular = _polished(parameters, arm, goal, q)
+    is_delicate = ca.logic_or(closeness > 0.0, ca.logic_not(is_regular))
     inputs = {
         "parameters": parameters,
         "goal": goal,
@@ -365,7 +366,7 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
     }
     place = 5 - arm.i if arm.is_reversed else arm.i
     graph = known_solutions(
-        parameters, inputs, (is_tried, is_real), q, error, closeness, closeness > 0.0, place
+        parameters, inputs, (is_tried, is_real), q, error, closeness, is_delicate, place
     )
     shared = ("goal", "motion", "six", "reflections", "constant", "R")
     return PipelineStep(graph, ROOTS, shared={name: name for name in shared})
@@ -438,27 +439,35 @@ def _joints(arm: _Arm, motion: _SX, known: dict[int, _SX], far: tuple[_SX, _SX])
     return [angles[k] for k in range(6)]
 
 
-def _polished(parameters: _SX, arm: _Arm, goal: _SX, q: list[_SX]) -> tuple[_SX, _SX]:
-    """Return joint values in the robot's order after Newton's method, in (-pi, pi], and their error."""
+def _polished(parameters: _SX, arm: _Arm, goal: _SX, q: list[_SX]) -> tuple[_SX, _SX, _SX]:
+    """Return joint values in the robot's order after Newton's method, in (-pi, pi], their error, and if it is regular.
+
+    Two steps lead from the elimination's solution, whose error is some 1e-9 rad, to rounding.
+    """
     # From the tool, the axes of the robot are met in the opposite order, with opposite directions.
     order = range(5, -1, -1) if arm.is_reversed else range(6)
     sense = -1.0 if arm.is_reversed else 1.0
     directions = [sense * arm.directions[k] for k in order]
     points = [arm.points[k] for k in order]
-    x = ca.vertcat(*(q[k] for k in order))
     length = 1.0 / arm.per_length
 
     symbol = ca.SX.sym("q", 6)
     T, J = _tool_and_jacobian(arm, directions, points, symbol)
     goal_symbol = ca.SX.sym("goal", 4, 4)
     error = pose_error(T, goal_symbol, length)
+    inputs = [parameters, goal_symbol, symbol]
     step = levenberg_step(J, error, ca.SX(BASE_DAMPING), [ca.SX(0.0)] * 6)
-    better = ca.Function("better", [parameters, goal_symbol, symbol], [symbol + step])
-    for _ in range(_POLISHING_STEPS):
-        x = better(parameters, goal, x)
-    of_pose = ca.Function("error", [parameters, goal_symbol, symbol], [error])(parameters, goal, x)
+    damped = ca.Function("damped", inputs, [symbol + step])
+    step, is_regular = newton_step(J, error)
+    is_small = ca.mmax(ca.fabs(step)) < _LARGEST_STEP
+    better = ca.if_else(is_small, symbol + step, symbol)
+    newton = ca.Function("newton", inputs, [better, is_regular])
+
+    x = damped(parameters, goal, ca.vertcat(*(q[k] for k in order)))
+    x, is_regular = newton(parameters, goal, x)
+    of_pose = ca.Function("error", inputs, [error])(parameters, goal, x)
     largest = ca.sqrt(ca.fmax(ca.sumsqr(of_pose[:3]), ca.sumsqr(of_pose[3:])))
-    return x + math.tau * ca.floor((math.pi - x) / math.tau), largest
+    return x + math.tau * ca.floor((math.pi - x) / math.tau), largest, is_regular
 
 
 def _tool_and_jacobian(

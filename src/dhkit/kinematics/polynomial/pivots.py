@@ -6,6 +6,8 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
+from dhkit.kinematics.closed_form.formulas import SINGULAR
+
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
 _TINY = 1e-300
@@ -43,9 +45,18 @@ def not_zero(x: _SX) -> _SX:
     return ca.if_else(x == 0.0, _TINY, x)
 
 
-def determinant(matrix: list[list[_SX]]) -> _SX:
-    """Return the determinant."""
-    A, _, product = eliminated(matrix)
-    for k in range(len(A)):
-        product = product * A[k][k]
-    return product
+def newton_step(J: _SX, twist: _SX) -> tuple[_SX, _SX]:
+    """Return the step of Newton's method, 6 x 1, rad, and whether the Jacobian has no small singular value.
+
+    ``J`` and ``twist`` have lengths as shares of the reach. The product of the five larger singular values is at most
+    (|J|^2 / 5)^(5/2), with the squares' sum |J|^2; with the determinant it bounds the least one.
+    """
+    A, right, _ = eliminated([ca.horzsplit(row) for row in ca.vertsplit(J)], ca.vertsplit(twist))
+    determinant = ca.SX(1.0)
+    step: list[_SX] = []
+    for k in reversed(range(6)):
+        determinant = determinant * A[k][k]
+        known = sum((A[k][j] * x for j, x in enumerate(step, start=k + 1)), ca.SX(0.0))
+        step.insert(0, (right[k] - known) / not_zero(A[k][k]))
+    mean = ca.sumsqr(J) / 5.0
+    return ca.vertcat(*step), ca.fabs(determinant) > SINGULAR * mean * mean * ca.sqrt(mean)

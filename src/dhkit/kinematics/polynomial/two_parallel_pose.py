@@ -99,7 +99,7 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
     is_tried, is_real, closeness = of_root
     signs, also = fitting_signs(Numbers.read(parameters[:COUNT]), meeting, goal, angle)
     q, error, is_regular = solution_function(meeting)(parameters[:COUNT], goal, angle, signs)
-    is_delicate = ca.logic_and(closeness > 0.0, ca.logic_not(is_regular))
+    is_delicate = ca.logic_not(is_regular)
     inputs = {
         "parameters": parameters,
         "goal": goal,

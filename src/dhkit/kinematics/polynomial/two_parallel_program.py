@@ -11,7 +11,7 @@ import casadi as ca
 
 from dhkit.kinematics.closed_form.formulas import turned_about_x, turned_about_z
 from dhkit.kinematics.polynomial.extension import SIGNS, Element, Extension, Root
-from dhkit.kinematics.polynomial.pivots import eliminated, not_zero
+from dhkit.kinematics.polynomial.pivots import newton_step
 from dhkit.symbolic import Graph
 
 SX: TypeAlias = Any
@@ -28,8 +28,6 @@ _POLISHING_STEPS = 1
 """Newton steps from a root of the polynomial, whose error is about 1e-10 rad, to rounding."""
 _LARGEST_STEP = 1e-3
 """Larger steps, rad, are not taken: near a double root they lead elsewhere."""
-_REGULAR = 1e-4
-"""Least singular value of a solution that is known to be regular."""
 _ALSO_FITS = 1e-6
 """Residual, a share of the squared reach, of combinations of signs that may also be solutions: two at the same q1."""
 
@@ -117,29 +115,12 @@ def solution_function(meeting: tuple[int, int]) -> ca.Function:
     q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
     # q1 alone was polished, to which the others follow: one step of all of them closes to rounding.
     twist, J = _twist_and_jacobian(p, T, q)
-    step, is_regular = _newton_step(J, twist)
+    step, is_regular = newton_step(J, twist)
     is_small = ca.mmax(ca.fabs(step)) < _LARGEST_STEP
     q = [ca.if_else(is_small, angle + step[k], angle) for k, angle in enumerate(q)]
     q = [angle + math.tau * ca.floor((math.pi - angle) / math.tau) for angle in q]
     outputs = [ca.vertcat(*q), _error(p, T, q), is_regular]
     return ca.Function("solution", [parameters, T, q_1, signs], outputs)
-
-
-def _newton_step(J: SX, twist: SX) -> tuple[SX, SX]:
-    """Return the step of Newton's method, 6 x 1, rad, and whether the Jacobian has no singular value below 1e-4.
-
-    ``J`` and ``twist`` have lengths as shares of the reach. The product of the five larger singular values is at most
-    (|J|^2 / 5)^(5/2), with the squares' sum |J|^2.
-    """
-    A, right, _ = eliminated([ca.horzsplit(row) for row in ca.vertsplit(J)], ca.vertsplit(twist))
-    determinant = ca.SX(1.0)
-    step: list[SX] = []
-    for k in reversed(range(6)):
-        determinant = determinant * A[k][k]
-        known = sum((A[k][j] * x for j, x in enumerate(step, start=k + 1)), ca.SX(0.0))
-        step.insert(0, (right[k] - known) / not_zero(A[k][k]))
-    mean = ca.sumsqr(J) / 5.0
-    return ca.vertcat(*step), ca.fabs(determinant) > _REGULAR * mean * mean * ca.sqrt(mean)
 
 
 def _twist_and_jacobian(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX]:
