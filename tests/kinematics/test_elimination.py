@@ -550,7 +550,7 @@ def test_of_nearly_spherical_wrists_no_solution_is_missed_in_silence(offset, law
 
 @pytest.mark.law
 def test_beside_a_curve_of_solutions_none_is_missed_in_silence(law):
-    """Where four axes are nearly parallel, iteration closes at false solutions beside the curve that they would have."""
+    """Where four axes are nearly parallel, iteration closes at false solutions beside the curve they would have."""
     arm = GENERAL["three parallel axes, offset wrist"]
     rng = np.random.default_rng(5)
     missed = 0
