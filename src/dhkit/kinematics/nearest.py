@@ -41,8 +41,14 @@ _TIMES = 13
 """Number of divisions: the interval shrinks by 4 each time, to 2e-10 of the arc."""
 _OUT_OF_REACH = -5.0
 """Value below those of all traces of rotations, which are -1 to 3."""
-_ROUNDING = 1e-12
+_ROUNDING = 1e-14
 """Share of the reach, and of the distance from the world's origin, by which a position may be out of reach."""
+_SLACK = 0.1
+"""Part of that by which solutions may be out of reach: ``ik`` has to reach them."""
+_SHORT = 1e-3
+"""Product of two lengths, over the reach squared, that is small."""
+_LEAST_ROOM = 1e-30
+"""Divisor, over the reach squared, instead of 0."""
 _U = np.array([0.0, 1.0, 0.0])
 _V = np.array([0.0, 0.0, 1.0])
 """Directions u and v in the frame (x, u, v)."""
@@ -154,12 +160,14 @@ class _Plane:
         R = self.R @ T[:, :3, :3]
         p = T[:, :3, 3] @ self.R.T + self.t
         far = np.linalg.norm(T[:, :3, 3], axis=1) + np.linalg.norm(self.t)
+        far += np.linalg.norm(self.arm) + np.linalg.norm(self.foot)
         rounding = _ROUNDING * (1.0 + far / self.reach[1])
         # Four rows for each pose: two shoulders, and two arcs of the roll.
         owner = np.repeat(np.arange(len(T)), 4)
         shoulder = np.tile([1.0, 1.0, -1.0, -1.0], len(T))
         turn = np.tile([1.0, -1.0, 1.0, -1.0], len(T))
-        begin, end = (np.repeat(values, 4) for values in self._arc(np.hypot(p[:, 0], p[:, 2])))
+        from_axis_1 = np.hypot(p[:, 0], p[:, 2]) + _SLACK * rounding * self.reach[1]
+        begin, end = (np.repeat(values, 4) for values in self._arc(from_axis_1))
 
         def best(row: NDArray[np.intp], share: Array) -> tuple[Array, Array, Array, Array]:
             """Return what _best returns at parts of the rows' arcs, and q5; the parts are closer at an arc's ends."""
@@ -207,7 +215,7 @@ class _Plane:
 
         The tool's origin lies beside the plane by foot + |arm| cos(roll), at rolls and at their negatives.
         """
-        radius = max(float(np.linalg.norm(self.arm)), np.finfo(float).tiny)
+        radius = max(float(np.linalg.norm(self.arm)), _LEAST_ROOM * self.reach[1])
         least = np.arccos(np.clip((far - self.foot[2]) / radius, -1.0, 1.0))
         most = np.arccos(np.clip((-far - self.foot[2]) / radius, -1.0, 1.0))
         return least, most
@@ -245,13 +253,16 @@ class _Plane:
         along = B[..., 0, 0] + B[..., 1, 1]
         across = B[..., 0, 1] - B[..., 1, 0]
         to_axis_2 = np.stack([x - self.a1, np.broadcast_to(p[:, 1, None], x.shape)], axis=-1)
-        rho, missed = self._angle(np.arctan2(across, along), to_axis_2, lever[..., :2])
+        wanted = np.arctan2(across, along)
+        rho, missed = self._angle(wanted, to_axis_2, lever[..., :2], rounding)
         missed = missed + beside
         trace = B[..., 2, 2] + np.cos(rho) * along + np.sin(rho) * across
         value = np.where(missed > rounding[:, None], 2 * _OUT_OF_REACH - missed, trace)
         return value, q1, rho
 
-    def _angle(self, wanted: Array, tool: Array, lever: Array) -> tuple[Array, Array]:
+    def _angle(
+        self, wanted: Array, tool: Array, lever: Array, rounding: Array
+    ) -> tuple[Array, Array]:
         """Return the angles nearest to the wanted ones (...) at which two links reach axis 4, and how far they miss it.
 
         Axis 4 is at tool - e^(i rho) lever from axis 2, both (..., 2):
@@ -266,9 +277,11 @@ class _Plane:
         excess = np.maximum(squares - product - most**2, least**2 - squares - product)
         missed = np.maximum(excess, 0.0) / most**2
         # The cosine is at least (squares - most^2) / product, so that |rho - middle| is between two angles of [0, pi].
-        room = np.maximum(product, np.finfo(float).tiny)
-        near = np.arccos(np.clip((squares - least**2) / room, -1.0, 1.0))
-        far = np.arccos(np.clip((squares - most**2) / room, -1.0, 1.0))
+        # With the tool nearly on axis 4 there is no lever: only rounding tells whether any angle is possible.
+        slack = np.where(product < _SHORT * most**2, _SLACK * rounding[:, None] * most**2, 0.0)
+        room = np.maximum(product, _LEAST_ROOM * most**2)
+        near = np.arccos(np.clip((squares - least**2 + slack) / room, -1.0, 1.0))
+        far = np.arccos(np.clip((squares - most**2 - slack) / room, -1.0, 1.0))
         gap = np.remainder(wanted - middle + np.pi, 2 * np.pi) - np.pi
         rho: Array = middle + np.copysign(np.clip(np.abs(gap), near, far), gap)
         return rho, missed

@@ -70,6 +70,18 @@ def closure(arm, found, T):
     return error.max()
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-16, 1e-14, 1e-12, 1e-9, 1e-6])
+@pytest.mark.parametrize("bend", [0.0, 0.7])
+def test_axis_5_may_stand_on_the_vertical_beside_axis_1(bend, noise):
+    """There neither the position nor axis 5 gives joint 1 well: rounding decides which of them is better."""
+    rows = [[0, 349, 0, -90], [0, 30, 221, 0], [0, 0, 221, 0], [90, 0, 0, 90], [0, 145, 0, 0]]
+    arm = Arm.from_dh(rows, **LINKS)
+    q = random_states(400, seed=8)
+    q[:, 1:4] = np.array([-np.pi / 2 - bend, 2 * bend, -bend])
+    q[:, 1:4] += noise * np.random.default_rng(9).normal(size=(400, 3))
+    assert arm.ik(arm.fk(q)).valid.any(axis=-1).all()
+
+
 @pytest.mark.parametrize("name", ARMS)
 def test_the_tool_may_be_on_axis_1(name):
     """There the position leaves joint 1 free, and axis 5 decides."""

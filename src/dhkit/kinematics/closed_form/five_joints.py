@@ -45,6 +45,8 @@ from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
 _WELL_CONDITIONED = 1e-3
 """Share of the horizontal part of axis 5 that the foot's distance along the plane needs, over ``scale``, to decide."""
+_EPSILON = 1e-16
+"""Relative rounding error of a number."""
 OFF_PLANE = 1e-9
 """Sine of an angle, or share of ``scale``, by which axis 5 may lie off the arm's plane: a pose that misses it by more
 is out of reach."""
@@ -133,14 +135,18 @@ def five_joints_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]
 def _planes(p: Mapping[str, SX], foot: Vector, axis: Vector, pose: PoseSymbols) -> list[Shoulder]:
     """Return the two positions of joint 1 that bring the plane through the foot, or along axis 5.
 
-    The foot decides, unless it is so near to axis 1 that q1 hardly moves it across the plane: then axis 5 does. The
-    other condition is checked.
+    The foot decides, unless it is so near to axis 1 that q1 hardly moves it across the plane: then axis 5 does, if it
+    is not along axis 1. The other condition is checked.
     """
     horizontal = hypot(axis[0], axis[2])
     scale = pose.scale
     found = []
     for shoulder in ordered_shoulders(p, foot, pose):
-        by_foot = fabs(shoulder.x) >= _WELL_CONDITIONED * horizontal * scale
+        # Rounding turns q1 by eps / horizontal along the axis, and by sqrt(eps / (r / scale)) at most through the foot.
+        by_foot = logic_or(
+            fabs(shoulder.x) >= _WELL_CONDITIONED * horizontal * scale,
+            horizontal * horizontal * scale < _EPSILON * shoulder.r,
+        )
         q1 = select_pair(by_foot, shoulder.q1, _along(axis, shoulder))
         seen = to_arm_frame(axis, q1)
         here = to_arm_frame(foot, q1)
