@@ -289,3 +289,37 @@ def test_a_quantity_defined_in_one_step_is_known_in_the_next():
     assert [entry.verdict for entry in judged("puma560", given).entries[:4]] == [
         Verdict.CORRECT
     ] * 4
+
+
+def turntable(links, a1, offset=0.0):
+    """Return a turntable with two or three parallel joints, or with three and a roll: 3, 4 or 5 joints."""
+    right = np.pi / 2
+    rows = [(0, 0.349, a1, -right), (0, offset, 0.221, 0), (0, 0, 0.221, 0)]
+    rows += {3: [], 4: [(0, 0, 0.145, 0)], 5: [(right, 0, 0, right), (0, 0.145, 0, 0)]}[links]
+    return dhkit.description.from_dh(rows, name="turntable")
+
+
+BOTH = ["atan2(py, px)", "atan2(-py, -px)"]
+AXIS_5 = ["atan2(r23, r13)", "atan2(-r23, -r13)"]
+LEFT_AND_RIGHT = "atan2(py, px) - atan2(d2, ±sqrt(px^2 + py^2 - d2^2))"
+
+
+@pytest.mark.parametrize(
+    ("arm", "solution", "verdict"),
+    [
+        *((turntable(n, a1), BOTH, "correct") for n in (3, 4, 5) for a1 in (0.3, 0.45, 0.5)),
+        (turntable(3, 0.5), ["atan2(py, px)", "atan2(-py, px)"], "wrong"),
+        (turntable(5, 0.5), ["atan2(py, px)", "atan2(py, px) + 0.1"], "wrong"),
+        (turntable(5, 0.05, 0.03), LEFT_AND_RIGHT, "correct"),
+        (turntable(5, 0.05, 0.03), LEFT_AND_RIGHT.replace(" - atan2", " + atan2"), "wrong"),
+        (turntable(5, 0.05), AXIS_5, "correct"),
+    ],
+)
+def test_a_root_is_right_though_later_joints_do_not_reach_the_pose_after_it(arm, solution, verdict):
+    """With the shoulder far from axis 1, or beside it, one of two roots alone leads to a solution at most poses."""
+    given = {"joint": 1, "solution": solution}
+    assert judged(arm, [given]).entries[0].verdict.value == verdict
+    if verdict == "correct":
+        # The equation of a root that leads nowhere determines the joint as well.
+        equation = "s1*px - c1*py = -d2" if "d2" in solution else "s1*px - c1*py = 0"
+        assert judged(arm, [given | {"equation": equation}]).entries[0].verdict.value == verdict

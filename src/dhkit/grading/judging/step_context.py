@@ -78,6 +78,17 @@ class StepContext:
             None,
         )
 
+    @cached_property
+    def roots(self) -> Array:
+        """Joint values by the worked solution at :attr:`solved_poses`, shape (S, C, n), rad and m; C = 0 without one.
+
+        Later joints may have no solution after a root: their values are NaN.
+        """
+        poses = self.solved_poses
+        if self.derivation is None:
+            return np.empty((len(poses.q), 0, self.description.n))
+        return self.derivation.roots(poses.T)
+
     def lengths(self, trees: Sequence[Tree]) -> Lengths:
         """Return the lengths that formulas may contain, with the names d1, a1 ... if the formulas use such names.
 

@@ -161,7 +161,7 @@ class Equations:
         if not poses.has_closed_form or used & later:
             return None
         equations = _EquationsAtPoses(self.differences, poses, used)
-        return other_root(poses, own, self.before, equations.residual_on)
+        return other_root(poses, own, self.before, equations.residual_on, self.context.roots)
 
     def _factor_of_other_roots(self, tree: Tree) -> Part | None:
         """Return the verdict on an equation that is a product with a needless factor; None for other equations.

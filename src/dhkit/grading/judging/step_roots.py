@@ -36,6 +36,7 @@ def other_root(
     joint: int,
     before: Sequence[int],
     residual_on: Callable[[NDArray[np.intp], Array], Residual],
+    worked: Array,
 ) -> float | None:
     """Return a root of the equations that is not a joint value of any solution; None if all roots are solutions.
 
@@ -50,6 +51,8 @@ def other_root(
     residual_on
         Function from the indices of poses (k,) and joint values (k, n) to the residual of the equations, the largest of
         all of them, relative to the largest size of their terms at these joint values.
+    worked
+        Roots of the worked solution, shape (S, C, n), rad and m: after them later joints may have no solution.
     """
     count = min(_TRIED_POSES, len(poses.q))
     truths = poses.truths[:count]
@@ -71,10 +74,13 @@ def other_root(
     rows, roots = _roots(lambda k, x: residual(k, with_value(k, x)), grid, count)
 
     # Roots that are the joint's value in a solution with the same values of the joints before are expected.
-    gaps_before = poses.gaps(truths[..., before], q[:, None, before], list(before))
-    is_expected = is_solution & np.all(gaps_before < _FAR, axis=-1)
+    known = np.concatenate(
+        [np.where(is_solution[..., None], truths, np.nan), worked[:count]], axis=1
+    )
+    gaps_before = poses.gaps(known[..., before], q[:, None, before], list(before))
+    is_expected = np.isfinite(known[..., joint]) & np.all(gaps_before < _FAR, axis=-1)
     gaps = np.where(
-        is_expected[rows], poses.gaps(roots[:, None], truths[rows, :, joint], joint), np.inf
+        is_expected[rows], poses.gaps(roots[:, None], known[rows, :, joint], joint), np.inf
     )
     is_other = np.all(gaps > _FAR, axis=1)
 

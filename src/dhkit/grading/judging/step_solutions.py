@@ -1,7 +1,8 @@
 """Judging of the solutions of steps of inverse kinematics: a joint's values, given the joints of earlier steps.
 
 The student's roots are followed: each choice among the roots of earlier steps has a set of the arm's solutions that
-agree with it, and a formula is right if its value belongs to one of them, at all poses and after every choice. An
+agree with it, and a formula is right if its value belongs to one of them, at all poses and after every choice. A root
+after which later joints have no solution at a pose is right too, if the worked solution has it. An
 earlier joint without a right solution has its true values: any of them if one formula is right for all, else those of
 one branch, or with one sign of the sine or cosine, the same in all following steps.
 """
@@ -99,10 +100,13 @@ class Solutions:
     ----------
     context
         The arm and poses.
+    takes_roots
+        Whether roots of the worked solution are right where no solution of the arm follows them.
     """
 
-    def __init__(self, context: StepContext) -> None:
+    def __init__(self, context: StepContext, takes_roots: bool = True) -> None:
         self.context = context
+        self._takes_roots = takes_roots
         self.unsolved: list[int] = []
         """Joints of earlier steps, from 0, without a right solution, about which the hypotheses assume nothing yet."""
         self.solved: set[int] = set()
@@ -305,14 +309,28 @@ class Solutions:
                 after_formula.append(after)
 
                 rows = choice.rows
+                is_right = after.rows
+                if self._takes_roots and not np.all(is_right[rows]):
+                    is_right = is_right | self._are_roots(choice, step.joint, x)
                 if np.any(rows):
-                    right[k, c] = np.mean(after.rows[rows])
+                    right[k, c] = np.mean(is_right[rows])
                 within_limits = rows & self.context.within_limits
                 if np.any(within_limits):
-                    right_within_limits[k, c] = np.mean(after.rows[within_limits])
+                    right_within_limits[k, c] = np.mean(is_right[within_limits])
             values.append(of_formula)
             following.append(after_formula)
         return _Trial(hypothesis, values, following, right, right_within_limits, in_pairs)
+
+    def _are_roots(self, choice: Choice, joint: int, x: Array) -> Mask:
+        """Return whether values x (S,) of a joint, rad or m, are roots of the worked solution after a choice, (S,)."""
+        roots = self.context.roots
+        gaps_in = self.context.solved_poses.gaps
+        is_root = gaps_in(x[:, None], roots[..., joint], joint) < MATCHES
+        for j in range(roots.shape[-1]):
+            # Joints that the choice has not found yet may have any value.
+            gaps = gaps_in(choice.q[:, None, j], roots[..., j], j)
+            is_root &= (gaps < MATCHES) | np.isnan(choice.q[:, None, j])
+        return np.asarray(is_root.any(axis=1))
 
     def _evaluated(self, tree: Tree, choice: Choice) -> Array:
         """Return the values of a formula at all poses, shape (S,), rad or m; NaN for no value."""
@@ -444,7 +462,7 @@ class Solutions:
         """Return the mistake in a wrong formula, and a detail; None if none explains it."""
 
         def is_right_for(other: StepContext) -> bool:
-            judge = Solutions(other)
+            judge = Solutions(other, takes_roots=False)
             judge.unsolved = list(before)
             part, _ = judge.part(replace(step, solutions=(tree,)), before)
             return part.verdict.passes

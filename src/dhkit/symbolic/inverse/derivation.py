@@ -342,6 +342,22 @@ class InverseDerivation:
                 result[rows, branch[rows]] = self._joints(values)[rows]
         return result.reshape((*T.shape[:-2], B, self.n))
 
+    def roots(self, T: Array) -> Array:
+        """Return joint values for each choice of roots, whether or not later steps have a solution after them.
+
+        Parameters
+        ----------
+        T
+            Poses of the tool in the world, shape (N, 4, 4), m.
+
+        Returns
+        -------
+        Array
+            Shape (N, C, n), rad in (-pi, pi] and m; NaN from the first step of a choice on that has no solution.
+        """
+        with np.errstate(all="ignore"):
+            return np.stack([self._joints(values) for values, _ in self.candidates(T)], axis=1)
+
     def candidates(self, T: Array) -> Iterator[tuple[Values, Array]]:
         """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and a solution mask (N,).
 
@@ -371,7 +387,7 @@ class InverseDerivation:
             letters = {letter: values.of(element) for letter, element in step.form.letters.items()}
             found, radicand = step.form.solve(letters, signs.get(k, 1.0))
             is_solved &= np.broadcast_to(radicand >= -ZERO_RADICAND, count)
-            values.set_unknown(step.form.unknown, np.broadcast_to(found, count))
+            values.set_unknown(step.form.unknown, np.where(is_solved, found, np.nan))
 
         for condition in self.conditions:
             distance = np.abs(values.of(condition.left) - values.of(condition.right))
