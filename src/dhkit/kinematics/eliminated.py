@@ -37,6 +37,8 @@ _TOGETHER = 256
 _FURTHER_WAYS = 2
 """Number of further eliminations whose programs are tried before poses are solved with care."""
 _OUT_OF_LIMITS = np.uint8(IKFlag.out_of_limits)
+_MOST_NUMBERS = 4_000_000
+"""Largest number of distances that are held at a time, 32 MB."""
 _EXACTLY = 1e-7
 """Smallest singular value of a solution that is singular to rounding."""
 _CLUSTER = 0.05
@@ -291,13 +293,17 @@ def _have_clusters(q: Array, flags: NDArray[np.uint8]) -> NDArray[np.bool_]:
     Where many roots coincide, Newton's method closes at false solutions near the true one.
     """
     is_singular = flags & np.uint8(IKFlag.singular) > 0
-    rows = np.flatnonzero(np.count_nonzero(is_singular, axis=1) > 1)
-    singular = np.where(is_singular[rows, :, None], q[rows], np.nan)
-    apart = 2 * np.abs(np.sin((singular[:, :, None] - singular[:, None]) / 2)).max(axis=-1)
-    apart[:, np.arange(q.shape[1]), np.arange(q.shape[1])] = np.nan
     have = np.zeros(len(q), dtype=bool)
-    # Comparisons with NaN are false.
-    have[rows] = (apart < _CLUSTER).any(axis=(1, 2))
+    every = np.flatnonzero(np.count_nonzero(is_singular, axis=1) > 1)
+    # Each pose has a distance for any two of its solutions, of which there may be hundreds near a curve of them.
+    together = max(1, _MOST_NUMBERS // (q.shape[1] ** 2 * q.shape[2]))
+    for begin in range(0, len(every), together):
+        rows = every[begin : begin + together]
+        singular = np.where(is_singular[rows, :, None], q[rows], np.nan)
+        apart = 2 * np.abs(np.sin((singular[:, :, None] - singular[:, None]) / 2)).max(axis=-1)
+        apart[:, np.arange(q.shape[1]), np.arange(q.shape[1])] = np.nan
+        # Comparisons with NaN are false.
+        have[rows] = (apart < _CLUSTER).any(axis=(1, 2))
     return have
 
 
