@@ -50,14 +50,15 @@ RESULTS = ("q", "summary", "details", "posed", "error")
 - ``summary``, 16 times 3: what is known of the root (``NONE``, ``SOLUTION``, ``NEAR_SOLUTION`` or ``DOUBTFUL``), the
   number by which solutions are sorted, and whether a joint is outside its limits;
 - ``details`` of the root, 16 times 4 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if
-  its solution may be singular; the error of its joint values; and more by the way of elimination;
+  its solution may be singular or that of another root; the error of its joint values; and more by the way of
+  elimination;
 - ``posed``, whether T is a pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
 BESIDE = 1.0
 COINCIDES = 2.0
-"""Another root is nearer than NEAR_ROOTS, so that the solution may be singular; or than NEAREST_ROOTS, so that both may
-be found as one."""
+"""Another root is nearer than NEAR_ROOTS, so that the solution may be singular; or than NEAREST_ROOTS or at the same
+angle, so that both may be found as one."""
 _ON_CIRCLE = 1e-6
 """Imaginary part of a root, rad, above which it is not surely real."""
 _AT_ROOT = 1e-5
