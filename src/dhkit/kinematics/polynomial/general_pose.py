@@ -22,7 +22,12 @@ import casadi as ca
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import BASE_DAMPING, orthonormal_goal
 from dhkit.kinematics.newton_program import levenberg_step, pose_error
-from dhkit.kinematics.polynomial.pivots import eliminated, newton_step, not_zero
+from dhkit.kinematics.polynomial.pivots import (
+    back_substituted,
+    eliminated,
+    newton_step,
+    not_zero,
+)
 from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, root_steps
 from dhkit.kinematics.polynomial.trigonometric import ROOTS, SAMPLES
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
@@ -380,10 +385,7 @@ def _near_angles(matrix: list[list[_SX]]) -> tuple[_SX, _SX]:
     size = len(matrix)
     b = [ca.SX(math.cos(2.0 + 5.0 * k)) for k in range(size)]
     A, right, _ = eliminated(matrix, b)
-    x: list[_SX] = [ca.SX(0.0)] * size
-    for k in reversed(range(size)):
-        rest = right[k] - sum((A[k][m] * x[m] for m in range(k + 1, size)), ca.SX(0.0))
-        x[k] = rest / not_zero(A[k][k])
+    x = back_substituted(A, right)
     largest = x[0] * 0.0
     for entry in x:
         largest = ca.fmax(largest, ca.fabs(entry))

@@ -45,6 +45,16 @@ def not_zero(x: _SX) -> _SX:
     return ca.if_else(x == 0.0, _TINY, x)
 
 
+def back_substituted(A: list[list[_SX]], right: list[_SX]) -> list[_SX]:
+    """Return x with A x = right, of a matrix and a right side as :func:`eliminated` returns them."""
+    size = len(right)
+    x: list[_SX] = [ca.SX(0.0)] * size
+    for k in reversed(range(size)):
+        rest = right[k] - sum((A[k][m] * x[m] for m in range(k + 1, size)), ca.SX(0.0))
+        x[k] = rest / not_zero(A[k][k])
+    return x
+
+
 def newton_step(J: _SX, twist: _SX) -> tuple[_SX, _SX]:
     """Return the step of Newton's method, 6 x 1, rad, and whether the Jacobian has no small singular value.
 
@@ -52,11 +62,9 @@ def newton_step(J: _SX, twist: _SX) -> tuple[_SX, _SX]:
     (|J|^2 / 5)^(5/2), with the squares' sum |J|^2; with the determinant it bounds the least one.
     """
     A, right, _ = eliminated([ca.horzsplit(row) for row in ca.vertsplit(J)], ca.vertsplit(twist))
+    step = back_substituted(A, right)
     determinant = ca.SX(1.0)
-    step: list[_SX] = []
     for k in reversed(range(6)):
         determinant = determinant * A[k][k]
-        known = sum((A[k][j] * x for j, x in enumerate(step, start=k + 1)), ca.SX(0.0))
-        step.insert(0, (right[k] - known) / not_zero(A[k][k]))
     mean = ca.sumsqr(J) / 5.0
     return ca.vertcat(*step), ca.fabs(determinant) > SINGULAR * mean * mean * ca.sqrt(mean)

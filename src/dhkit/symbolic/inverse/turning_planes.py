@@ -159,11 +159,7 @@ def slide(bench: Workbench) -> None:
 
 def parallel_fits(chain: ExactChain) -> bool:
     """Return whether axes 2, 3 and 4 are parallel, and 5 and 6 meet."""
-    if not (perpendicular(chain, 1) and parallel(chain, 2) and parallel(chain, 3)):
-        return False
-    if not (perpendicular(chain, 4) and perpendicular(chain, 5) and chain.a[4].is_zero):
-        return False
-    return not chain.a[1].is_zero and not chain.a[2].is_zero
+    return five_joints_fit(chain) and perpendicular(chain, 5) and chain.a[4].is_zero
 
 
 def _parallel_senses(chain: ExactChain) -> list[tuple[int, int]]:
