@@ -19,7 +19,6 @@ from dhkit.kinematics.polynomial.roots_program import (
     FIRST_RADII,
     MOST_STEPS,
     NEAR_ROOTS,
-    NEAREST_ROOTS,
     aberth_step,
     coefficients,
     complex_of,
@@ -56,9 +55,9 @@ RESULTS = ("q", "summary", "details", "posed", "error")
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
 BESIDE = 1.0
-COINCIDES = 2.0
-"""Another root is nearer than NEAR_ROOTS, so that the solution may be singular; or than NEAREST_ROOTS or at the same
-angle, so that both may be found as one."""
+"""Another root is nearer than NEAR_ROOTS or at the same angle: their solutions may be the same one, or singular."""
+_DELICATE = 2.0
+"""The solution may be singular, or that of another root."""
 _ON_CIRCLE = 1e-6
 """Imaginary part of a root, rad, above which it is not surely real."""
 _AT_ROOT = 1e-5
@@ -72,7 +71,7 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
 
     Their outputs are ``error``, and of each root ``angle``, rad, ``is_tried``, ``is_real`` and
-    ``closeness``: 0, ``BESIDE`` or ``COINCIDES`` where another root is near.
+    ``closeness``: ``BESIDE`` where another root is near, else 0.
 
     Parameters
     ----------
@@ -156,14 +155,10 @@ def _angles(parameters: _SX) -> PipelineStep:
         )
     # A root that far from the real axis has no solution.
     nearest = ca.fmax(nearest, height * height)
-    closeness = ca.if_else(
-        nearest < NEAREST_ROOTS**2, COINCIDES, ca.if_else(nearest < NEAR_ROOTS**2, BESIDE, 0.0)
-    )
-
     is_tried = angle < BEYOND
     # The root 1 / conj(z) is at the same angle: both lead to one solution.
     is_double = ca.logic_and(is_tried, height > _ON_CIRCLE)
-    closeness = ca.if_else(is_double, COINCIDES, closeness)
+    closeness = ca.if_else(ca.logic_or(nearest < NEAR_ROOTS**2, is_double), BESIDE, 0.0)
     inputs = {
         "parameters": parameters,
         "numbers": numbers,
@@ -241,7 +236,7 @@ def known_solutions(
         return ca.if_else(is_tried != 0.0, x, 0.0)
 
     is_near = ca.if_else(closeness > 0.0, BESIDE, 0.0)
-    care = ca.if_else(is_delicate, COINCIDES, is_near)
+    care = ca.if_else(is_delicate, _DELICATE, is_near)
     details = [is_tried, is_real, care, *map(at_tried, (error, *more))]
     outputs = {
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),

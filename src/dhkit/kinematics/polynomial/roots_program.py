@@ -41,8 +41,6 @@ _MARGIN = 1e4
 """Factor of that error, for roots that are tried."""
 NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
-NEAREST_ROOTS = 1e-4
-"""Distance of two roots, rad, below which Newton's method may find one solution from both."""
 
 
 def roots_program(degree: int, samples: int) -> Loop:
