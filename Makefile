@@ -10,8 +10,8 @@ BENCH_READY := $(VENV)/.ready-bench
 DOCS_READY := $(VENV)/.ready-docs
 # `make test ORDER=` runs the tests in random order.
 ORDER ?= -p no:randomly
-# `make test MARKS='not slow or browser'` runs the tests with a browser too, as .ci/run does.
-MARKS ?= not slow
+# `make test MARKS='not slow'` runs the tests with a browser too, as .ci/run does.
+MARKS ?= not slow and not browser
 PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile -q $(ORDER)
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Compiled modules are kept: without them each of the processes that tests start compiles all sources anew.

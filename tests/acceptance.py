@@ -177,12 +177,10 @@ class Recorder:
 def _left_out(config: pytest.Config) -> str:
     """Return a line on what this run leaves out, and the command that runs it."""
     laws = "laws at their full size and on every robot: make accept"
-    if config.option.markexpr == "not slow":
+    if config.option.markexpr == "not slow and not browser":
         return f"Left out: tests that take seconds, and all with a browser: make test-all; {laws}"
-    if config.option.markexpr == "not slow or browser":
-        return (
-            f"Left out: tests that take seconds but for those with a browser: make test-all; {laws}"
-        )
+    if config.option.markexpr == "not slow":
+        return f"Left out: tests that take seconds: make test-all; {laws}"
     return f"Left out: {laws}"
 
 
@@ -193,11 +191,10 @@ def _is_whole(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark laws, and what runs only in `make accept`, for -m law; and tests with a browser, which take seconds."""
+    """Mark laws, and what runs only in `make accept`, for -m law; and tests with a browser."""
     for item in items:
         if "chromium" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.slow)
         left = any(mark == only_accepting.mark for mark in item.iter_markers("skipif"))
         if left or "law" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.law)

@@ -87,6 +87,7 @@ def test_distances_are_those_of_coal(file):
         assert (ours[~is_apart] < 2e-4).all()
 
 
+@pytest.mark.slow
 def test_motions_are_found_and_motions_that_miss_something_are_not():
     (file,) = [one for one in FILES if one.stem == "puma560"]
     problems = problems_of(file)

@@ -65,6 +65,7 @@ def records(out):
 
 
 @pytest.mark.law
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no os.fork: one sheet after the other")
 def test_a_class_is_judged_alike_whether_it_is_killed_or_not(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -85,7 +85,6 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(demo):
     assert len(page) < 2_500_000
 
 
-@pytest.mark.slow
 def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(demo, chromium):
     folder, _ = demo("puma560")
     page = chromium.page()
@@ -247,7 +246,6 @@ def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
     assert np.all(np.abs(both.tau(t)) <= numbers.effort * (1 + KEPT))
 
 
-@pytest.mark.slow
 def test_the_page_of_the_plan_plays_without_a_jump(demo, chromium):
     folder, _ = demo("planar2r")
     page = chromium.page()

@@ -69,7 +69,6 @@ def test_what_is_assumed_is_said(dhkit, tmp_path):
     assert "a curved surface, which has no volume" in out
 
 
-@pytest.mark.slow
 def test_the_page_shows_the_arm_among_its_points(dhkit, tmp_path, chromium):
     assert dhkit("puma560", "--samples", "20000")[0] == 0
     page = chromium.page()

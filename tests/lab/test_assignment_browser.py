@@ -14,8 +14,6 @@ from dhkit.lab.assignment_form import PANELS
 from lab.test_assignment import EXAMPLES, met
 from waiting import wait_for
 
-pytestmark = pytest.mark.slow
-
 HOSTILE = "<img src=x onerror=window.hacked=1>"
 
 

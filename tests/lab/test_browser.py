@@ -24,8 +24,6 @@ from lab.controls import button, labelled, panel, set_joints
 from viewer.chromium import HANGS
 from waiting import wait_for
 
-pytestmark = pytest.mark.slow
-
 PANELS = ["joints", "tool", "table", "motion", "control"]
 DEGREE = math.pi / 180
 PRINTED = 5.1e-6
@@ -446,6 +444,7 @@ def test_the_four_transforms_of_a_row_are_animated(visit):
     page.until("!dhkit.stage.moving.visible")
 
 
+@pytest.mark.slow
 def test_the_transforms_of_all_rows_are_animated_with_their_entries_lit(visit):
     lab, page = visit("planar2r")
     panel(page, "table")
@@ -640,6 +639,7 @@ def test_joints_2_and_3_alone_and_an_arm_without_bodies(visit):
 # All panels
 
 
+@pytest.mark.slow
 def test_two_tabs_show_the_same_and_a_reload_restores_it(visit, chromium):
     lab, page = visit("puma560")
     other = chromium.page(**SMALL)

@@ -7,8 +7,6 @@ import pytest
 from lab.controls import button, labelled, panel
 from waiting import wait_for
 
-pytestmark = pytest.mark.slow
-
 ACTIONS = {
     "3: forward kinematics with read-outs": 1,
     "3 and 5: inverse kinematics with the tool's path": 2,
@@ -80,6 +78,7 @@ def controller_list(text):
     )
 
 
+@pytest.mark.slow
 def test_the_course_project_takes_these_actions(open_page):
     lab, page = open_page("puma560", width=1600, height=1000)
     person = Person(page)

@@ -13,8 +13,6 @@ from dhkit import Arm
 from dhkit.description import pose
 from lab.controls import button, labelled, panel, set_joints
 
-pytestmark = pytest.mark.slow
-
 PRINTED = 5.1e-5
 """Half of the last digit of an entry of M, and rounding."""
 HALF_A_DIGIT = 5.1e-4

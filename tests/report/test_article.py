@@ -179,6 +179,7 @@ def test_a_pdf_keeps_the_pages(tmp_path):
     assert 5 < report.pages <= MOST_PAGES
 
 
+@pytest.mark.slow
 def test_too_many_pages_are_told_in_one_line(tmp_path, monkeypatch, caplog):
     """Where no appendix at all is short enough, the report is written, and a line says so."""
     module = sys.modules[article.__module__]
@@ -264,6 +265,7 @@ def test_an_arm_without_derivation_has_all_solutions_of_a_pose(name, sentence):
     assert len(table.rows) >= 4
 
 
+@pytest.mark.slow
 def test_a_motion_and_a_run_are_shown(tmp_path):
     arm = Arm.load("planar2r")
     motion = arm.quintic([0, 0], [0.5, 0.4], 1.0)

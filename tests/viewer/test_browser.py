@@ -20,8 +20,6 @@ from simulation_results import swinging
 from viewer.pictures import MINIMUM, centre, green, orange, shows_the_arm
 from viewer.test_view import motion
 
-pytestmark = pytest.mark.slow
-
 PIXELS = 4.0  # a ball's outline is a little off its centre in perspective
 FLOAT32 = 2e-6  # m, on an arm of 2 m
 BETWEEN_PANELS = slice(70, 620)  # rows: the panels have the trace's color too

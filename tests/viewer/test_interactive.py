@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acceptance import in_time, sample_size
+from acceptance import in_time, sample_size, slow_if
 from dhkit import Arm, robots
 from dhkit.description import pose, pose_parts
 from dhkit.description.table_rows import from_dh, quantity
@@ -20,8 +20,6 @@ from dhkit.lab import Lab
 from dhkit.viewer import View
 from viewer.pictures import shows_the_arm
 from waiting import wait_for
-
-pytestmark = pytest.mark.slow
 
 GOLDEN = Path(__file__).with_name("golden_kinematics.json")
 """Poses of tools by Pinocchio, of five states of each arm of the library."""
@@ -296,7 +294,10 @@ def tool_is(page, arm):
     return q
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "panda", "cobra600"])
+@pytest.mark.parametrize(
+    "name",
+    ["puma560", *(slow_if(True, name) for name in ("stanford", "panda", "cobra600"))],
+)
 def test_joints_tool_and_table_follow_every_control(kept_page, name):
     arm = Arm.load(name)
     page = kept_page(name)

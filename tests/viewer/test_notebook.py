@@ -89,7 +89,6 @@ globalThis.handlers = handlers;
 </script>"""
 
 
-@pytest.mark.slow
 def test_the_widget_moves_the_arm_in_the_frame_and_strangers_do_not(chromium, tmp_path, signal_arm):
     script = (resources.files("dhkit.viewer") / "static" / "notebook.js").read_text("utf-8")
     view = View(signal_arm)

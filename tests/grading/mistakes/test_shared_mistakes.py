@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from acceptance import slow_if
 from dhkit.description import library_robot, with_parameters
 from dhkit.grading import grade_answers
 from dhkit.grading.judging.truth import Truth, truth_of
@@ -12,6 +13,7 @@ from dhkit.grading.mistakes.diagnosis import Variants, variants_of
 from grading_answers import written
 
 ROBOTS = ("cart_pendulum", "planar2r", "planar3r", "polar_rp")
+SLOW = ("planar2r", "planar3r")
 DYNAMICS = ("M", "h", "g", "tau", "K", "V", "L")
 SEED = 3
 
@@ -48,7 +50,7 @@ def table(truth, numbers, quantity):
     ]
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", [slow_if(name in SLOW, name) for name in ROBOTS])
 @pytest.mark.parametrize(("absolute", "friction"), [(False, False), (True, True)])
 def test_shared_mistakes_are_those_of_the_arm(robot, absolute, friction):
     first = library_robot(robot)
@@ -86,7 +88,7 @@ def wrong_answers(arm):
         }
 
 
-@pytest.mark.parametrize("robot", ["planar2r", "polar_rp"])
+@pytest.mark.parametrize("robot", [slow_if(True, "planar2r"), "polar_rp"])
 def test_reports_do_not_depend_on_who_was_judged_before(robot):
     first = library_robot(robot)
     second = with_other_numbers(first)
