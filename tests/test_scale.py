@@ -410,6 +410,7 @@ def task_of(path, judge=JUDGE, seconds=60.0):
     return JudgeTask.of(Sheet(path), judge, seconds, GIGABYTES)
 
 
+@pytest.mark.slow
 def test_a_process_judges_sheets_of_another_machine(tmp_path):
     """It needs neither the file nor the key; messages name the file as here; a process that ended is replaced."""
     path = tmp_path / "ada.py"

@@ -94,6 +94,7 @@ def solver_that(answer):
     return Contender("a solver", "ik", Mode.SINGLE, setup)
 
 
+@pytest.mark.slow
 def test_what_is_missed_and_invented_is_counted(monkeypatch):
     from dhkit.bench import problems
 

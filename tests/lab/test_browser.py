@@ -96,6 +96,7 @@ def test_a_number_is_typed_and_a_wrong_one_is_refused(kept_page):
     page.until("document.querySelector('.joint').classList.contains('outside')")
 
 
+@pytest.mark.slow
 def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(visit):
     lab, page = visit("puma560")
     q = lab.desk.q.copy()
@@ -576,6 +577,7 @@ def test_a_file_is_chosen(kept_page, tmp_path):
 # Control
 
 
+@pytest.mark.slow
 def test_a_controller_is_started_pushed_changed_and_stopped(visit):
     lab, page = visit("puma560")
     lab.answer("joints.named", {"name": "nominal"})

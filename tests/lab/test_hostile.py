@@ -485,6 +485,7 @@ def test_thousands_of_pages_come_and_go(lab):
     wait_for(lambda: not lab.view._live().pages)
 
 
+@pytest.mark.slow
 def test_many_pages_at_once_are_each_answered_and_see_the_same(lab):
     async def work(client, k):
         for turn in range(5):

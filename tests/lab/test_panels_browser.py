@@ -142,6 +142,7 @@ def test_the_workspace_is_drawn_and_the_distance_is_live(kept_page):
     page.until("dhkit.stage.overlays.layers.points.group.children.length === 0")
 
 
+@pytest.mark.slow
 def test_a_box_is_turned_and_moved_step_by_step(open_page):
     _, page = open_page("puma560")
     panel(page, "transforms")
@@ -317,6 +318,7 @@ def test_columns_of_a_mat_file_are_chosen(open_page, tmp_path):
     page.until(f"!{labelled('Joint values')}.offsetWidth")  # the answer comes after the state
 
 
+@pytest.mark.slow
 def test_a_motion_is_saved_as_a_video(open_page):
     lab, page = open_page("planar2r")
     panel(page, "motion")

@@ -313,6 +313,7 @@ def test_a_copied_record_is_noted(task, tmp_path, dhkit_command):
     assert not ada["notes"] and "begun and ended at the same seconds" in bob["notes"][0]
 
 
+@pytest.mark.slow
 def test_a_run_of_locked_joints_or_that_stands_still_is_none(task, tmp_path):
     six = ASSIGNMENT.replace("planar2r", "puma560").split("[[step]]")
     task.write_text(

@@ -77,6 +77,7 @@ def test_otters_tests_are_of_its_format(task):
         assert all(case["code"].startswith(">>> ") for case in cases)
 
 
+@pytest.mark.slow
 def test_nbgraders_cells_have_its_metadata(task, tmp_path):
     package = pack("nbgrader", task)
     notebook = notebook_of(package, "source/dynamics/dynamics.ipynb")

@@ -322,6 +322,7 @@ def test_unusable_input_is_one_line(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
+@pytest.mark.slow
 def test_the_command_writes_and_lists_its_files(tmp_path, capsys, monkeypatch):
     folder = tmp_path / "report"
     with pytest.raises(SystemExit) as status:

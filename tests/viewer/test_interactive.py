@@ -406,6 +406,7 @@ def test_an_edited_arm_has_the_labels_that_python_gives_it(kept_page):
     )
 
 
+@pytest.mark.slow
 def test_motions_are_listed_played_and_drawn_with_their_curves(visit):
     arm = Arm.load("puma560")
     q = np.array(arm.configurations["ready"])
