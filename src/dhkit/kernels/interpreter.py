@@ -152,7 +152,15 @@ class PipelineInterpreter:
                     rows.append(np.ascontiguousarray(x))
                 results = [np.empty((step.items, one.size)) for one in step.graph.outputs]
                 run(parameters, rows, results)
-                known.update((one.name, x) for one, x in zip(step.outputs, results, strict=False))
+                found = dict(zip((one.name for one in step.graph.outputs), results, strict=True))
+                if step.skips:
+                    is_skipped = known[step.skips][:, 0] != 0.0
+                    for x in results:
+                        x[is_skipped] = 0.0
+                if step.places:
+                    items = np.argsort(found[step.places][:, 0])
+                    found = {name: x[items] for name, x in found.items()}
+                known.update((one.name, found[one.name]) for one in step.outputs)
                 if step.most == 1 or not results[-1].any():
                     break
         return known

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 
 from dhkit.kernels.lowering import plain_results
-from dhkit.kernels.vectors import FUSING, WIDTH, Body, Vector
+from dhkit.kernels.vectors import FUSING, WIDTH, Body, Mask, Vector, select
 from dhkit.symbolic import Pipeline, PipelineStep
 from dhkit.symbolic.programs.pipeline import INDEX
 
@@ -97,7 +97,8 @@ def _called(pipeline: Pipeline, k: int) -> Iterator[str]:
     """Yield the lines that run a step, from the label ``stepK`` to a jump to the next one."""
     step = pipeline.steps[k]
     sources = [pipeline.source(step, one.name)[0] for one in step.graph.inputs[1:]]
-    buffers = [_buffer(name) for name in sources if name != INDEX]
+    buffers = [_buffer(step.skips)] if step.skips else []
+    buffers += [_buffer(name) for name in sources if name != INDEX]
     buffers += [_buffer(one.name) for one in step.outputs]
     pointers = ", ".join(f"ptr {name}" for name in ("%parameters", *buffers))
     yield f"step{k}:"
@@ -117,7 +118,7 @@ def _called(pipeline: Pipeline, k: int) -> Iterator[str]:
 
 
 def _function(pipeline: Pipeline, k: int) -> list[str]:
-    """Return the lines of a step as ``i1 stepK(ptr parameters, ptr inputs ..., ptr outputs ...)``.
+    """Return the lines of a step as ``i1 stepK(ptr parameters, [ptr skips,] ptr inputs ..., ptr outputs ...)``.
 
     It returns whether an item goes on.
     """
@@ -126,9 +127,11 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
     sources = [pipeline.source(step, one.name) for one in step.graph.inputs[1:]]
     read = [name for name, (source, _) in zip(names, sources, strict=True) if source != INDEX]
     written = [f"%out{j}" for j in range(len(step.outputs))]
-    pointers = ", ".join(f"ptr {name}" for name in ("%parameters", *read, *written))
+    skips = ["%skips"] if step.skips else []
+    pointers = ", ".join(f"ptr {name}" for name in ("%parameters", *skips, *read, *written))
 
     body = Body(FUSING, width=1 if step.items == 1 else WIDTH)
+    skipped = _skipped(body, step, written) if step.skips else None
     shared: list[str] = []
     parameters = range(step.graph.inputs[0].size)
     inputs = [_for_all(body, shared, "%parameters", parameters)]
@@ -144,10 +147,12 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
         else:
             inputs.append([_loaded(body, name, step, entry) for entry in range(variable.size)])
     results = plain_results(step.graph, body, inputs)
-    for name, entries in zip(written, results, strict=False):
-        for entry, value in enumerate(entries):
-            place = _place(body, name, step, entry)
-            body.lines.append(f"  store {body.number_type} {value.name}, ptr {place}, align 8")
+    if skipped is not None:
+        results = [[select(skipped, 0.0, value) for value in entries] for entries in results]
+    if step.places:
+        _store_at_places(body, step, written, results)
+    else:
+        _store_in_order(body, step, written, results)
     still = _any(body, step, results[-1][0]) if step.most > 1 else "false"
     return [
         f"define internal i1 @step{k}({pointers}) noinline {{",
@@ -155,9 +160,11 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
         *shared,
         "  br label %compute",
         "compute:",
-        "  %item = phi i64 [0, %entry], [%next, %compute]",
-        "  %still = phi i1 [false, %entry], [%still_after, %compute]",
+        "  %item = phi i64 [0, %entry], [%next, %computed]",
+        "  %still = phi i1 [false, %entry], [%still_after, %computed]",
         *body.lines,
+        "  br label %computed",
+        "computed:",
         f"  %still_after = or i1 %still, {still}",
         f"  %next = add i64 %item, {body.width}",
         f"  %more = icmp slt i64 %next, {step.items}",
@@ -166,6 +173,51 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
         "  ret i1 %still_after",
         "}",
     ]
+
+
+def _skipped(body: Body, step: PipelineStep, written: Sequence[str]) -> Mask:
+    """Return which of the current items are skipped; write 0 and go on with the next ones if all are."""
+    skipped = _loaded(body, "%skips", step, 0).differs(0.0)
+    bits = body.define(f"bitcast {body.truth_type} {skipped.name} to i{body.width}")
+    are_all = body.define(f"icmp eq i{body.width} {bits}, -1")
+    body.lines += [f"  br i1 {are_all}, label %skip, label %solve", "skip:"]
+    zero = Vector(body, body.constant(0.0))
+    _store_in_order(body, step, written, [[zero] * one.size for one in step.outputs])
+    body.lines += ["  br label %computed", "solve:"]
+    return skipped
+
+
+def _store_in_order(
+    body: Body, step: PipelineStep, written: Sequence[str], results: Sequence[Sequence[Vector]]
+) -> None:
+    """Write the current items' outputs next to each other."""
+    for name, entries in zip(written, results, strict=False):
+        for entry, value in enumerate(entries):
+            place = _place(body, name, step, entry)
+            body.lines.append(f"  store {body.number_type} {value.name}, ptr {place}, align 8")
+
+
+def _store_at_places(
+    body: Body, step: PipelineStep, written: Sequence[str], results: Sequence[Sequence[Vector]]
+) -> None:
+    """Write the current items' outputs one by one where ``places`` says."""
+    names = [one.name for one in step.outputs]
+    (places,) = results[names.index(step.places)]
+    if step.items % body.width:
+        # Those that fill up the last vector keep their places.
+        own = _index(body)
+        places = select(own < float(step.items), places, own)
+    for lane in range(body.width):
+        number = body.define(f"extractelement {body.number_type} {places.name}, i64 {lane}")
+        place = body.define(f"fptosi double {number} to i64")
+        for pointer, entries in zip(written, results, strict=False):
+            for entry, value in enumerate(entries):
+                one = body.define(f"extractelement {body.number_type} {value.name}, i64 {lane}")
+                start = body.define(
+                    f"getelementptr double, ptr {pointer}, i64 {entry * _padded(step.items)}"
+                )
+                address = body.define(f"getelementptr double, ptr {start}, i64 {place}")
+                body.lines.append(f"  store double {one}, ptr {address}, align 8")
 
 
 def _for_all(body: Body, lines: list[str], pointer: str, places: Sequence[int]) -> list[Vector]:

@@ -129,15 +129,15 @@ class _SurePoses:
         """Return the solutions of matrices, shape (N, 16)."""
         numbers = description.numbers
         parameters = np.concatenate([arm.parameters, numbers.lower, numbers.upper])
-        q = np.full((len(poses), ROOTS, description.n), np.nan)
-        flags = np.zeros((len(poses), ROOTS), dtype=np.uint8)
-        counts = np.zeros(len(poses), dtype=np.intp)
+        q = np.empty((len(poses), ROOTS, description.n))
+        flags = np.empty((len(poses), ROOTS), dtype=np.uint8)
+        counts = np.empty(len(poses), dtype=np.intp)
         for begin in range(0, len(poses), _TOGETHER):
             some = slice(begin, begin + _TOGETHER)
             goals = poses[some]
-            outputs = [np.empty((len(goals), size)) for size in output_sizes(arm.details)]
-            arm.pose_kernel(parameters, [goals], outputs)
-            counts[some] = _filled(outputs, q[some], flags[some])
+            others = [np.empty((len(goals), size)) for size in output_sizes(arm.details)[1:]]
+            arm.pose_kernel(parameters, [goals], [q[some].reshape(len(goals), -1), *others])
+            flags[some], counts[some] = _read(others, q[some])
         return cls(q, flags, counts)
 
     def solutions(
@@ -183,12 +183,14 @@ def _with_columns(table: NDArray[Any], count: int, filling: float) -> NDArray[An
     return columns
 
 
-def _filled(outputs: list[Array], q: Array, flags: NDArray[np.uint8]) -> NDArray[np.intp]:
-    """Write solutions of a chunk into ``q`` (N, 16, 6) and ``flags`` (N, 16); return their numbers, 0 if not sure."""
-    joints = outputs[0].reshape(q.shape)
-    kinds, order, are_outside = np.moveaxis(outputs[1].reshape(len(q), ROOTS, 3), -1, 0)
-    posed = outputs[3][:, 0]
-    error = outputs[4][:, 0]
+def _read(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
+    """Return the flags (N, 16) of sorted solutions of poses, and their numbers (N,), 0 if not sure.
+
+    Of joint values ``q``, shape (N, 16, 6), those that are no solutions become NaN.
+    """
+    kinds, are_outside = np.moveaxis(outputs[0].reshape(len(q), ROOTS, 2), -1, 0)
+    posed = outputs[2][:, 0]
+    error = outputs[3][:, 0]
     is_root = kinds != NONE
     counts: NDArray[np.intp] = np.count_nonzero(is_root, axis=1)
     # Complex roots come in pairs: an odd number is not all. False for NaN.
@@ -197,18 +199,14 @@ def _filled(outputs: list[Array], q: Array, flags: NDArray[np.uint8]) -> NDArray
     near = np.flatnonzero(is_sure & (kinds == NEAR_SOLUTION).any(axis=1))
     if len(near):
         owner, place = np.nonzero(is_root[near])
-        is_one = are_distinct(joints[near[owner], place], owner)
+        is_one = are_distinct(q[near[owner], place], owner)
         is_sure[near[owner[~is_one]]] = False
     counts[~is_sure] = 0
 
-    B = int(counts.max(initial=0))
-    places = np.argsort(np.where(is_root, order, np.inf), axis=1)[:, :B]
-    is_solution = np.arange(B) < counts[:, None]
-    row, column = np.nonzero(is_solution)
-    place = places[is_solution]
-    q[row, column] = joints[row, place]
-    flags[row, column] = np.where(are_outside[row, place] == 1.0, _OUT_OF_LIMITS, np.uint8(0))
-    return counts
+    is_solution = np.arange(ROOTS) < counts[:, None]
+    q[~is_solution] = np.nan
+    is_flagged = is_solution & (are_outside == 1.0)
+    return np.where(is_flagged, _OUT_OF_LIMITS, np.uint8(0)), counts
 
 
 def _solved_with_care(description: Description, poses: Array) -> IKSolutions:

@@ -41,7 +41,7 @@ class EliminatedPoseCall:
         middle = np.arange(1.0, description.n + 1.0) / description.n
         self._description = description
         # What is known of the roots, whether T is a pose, and the error of its polynomial; details are left out.
-        self._packed = struct.Struct(f"{3 * ROOTS}d{8 * arm.details * ROOTS}xdd")
+        self._packed = struct.Struct(f"{2 * ROOTS}d{8 * arm.details * ROOTS}xdd")
         self._shared: dict[int, dict[str, object]] = {}
         self._call: FastCall = SingleCall(
             arm.pose_kernel,
@@ -111,24 +111,22 @@ class EliminatedPoseCall:
             return None
         q, packed = found
         *roots, posed, error = self._packed.unpack(packed)
-        kinds = roots[::3]
+        kinds = roots[::2]
         # False for NaN.
         is_known = posed == 1.0 and error < INEXACT
         if not is_known or DOUBTFUL in kinds:
             return None
-        places = [k for k, kind in enumerate(kinds) if kind != NONE]
-        count = len(places)
+        count = ROOTS - kinds.count(NONE)
         # Complex roots come in pairs. The ordinary way says whether a pose without solutions is out of reach.
         if count == 0 or count % 2:
             return None
-        if NEAR_SOLUTION in kinds and not _are_different(q[places]):
+        if NEAR_SOLUTION in kinds and not _are_different(q[:count]):
             return None
-        places.sort(key=roots[1::3].__getitem__)
-        are_outside = roots[2::3]
+        are_outside = roots[1 : 2 * count : 2]
         flags = bytes(count)
         if 1.0 in are_outside:
-            flags = bytes([_OUTSIDE if are_outside[k] else _INSIDE for k in places])
-        return q.take(places, 0), flags
+            flags = bytes([_OUTSIDE if outside else _INSIDE for outside in are_outside])
+        return q[:count].copy(), flags
 
     def _shared_by(self, count: int) -> dict[str, object]:
         """Return what all poses with so many solutions share, see :meth:`IKSolutions.of_packed`."""

@@ -28,8 +28,13 @@ from dhkit.kinematics.polynomial.pivots import (
     newton_step,
     not_zero,
 )
-from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, root_steps
-from dhkit.kinematics.polynomial.trigonometric import ROOTS, SAMPLES
+from dhkit.kinematics.polynomial.pose_steps import (
+    RESULTS,
+    known_solutions,
+    root_steps,
+    solving_steps,
+)
+from dhkit.kinematics.polynomial.trigonometric import SAMPLES
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
 from dhkit.symbolic.programs.graph import Variable
 
@@ -49,6 +54,8 @@ _SIZES = (1, 12, 18, 18, 3 * _EQUATIONS * _NEAR, 12)
 """Numbers of parameters: see :class:`_Arm`."""
 _REFLECTIONS = sum(_EQUATIONS - k for k in range(_FAR))
 """Number of entries of all vectors of reflections: each is one shorter than the one before."""
+_SHARED = ("goal", "motion", "six", "reflections", "constant", "R")
+"""What the solutions at all roots use."""
 _FIRST_ANGLE = 0.1
 """First angle at which the polynomial is evaluated, rad."""
 _LARGEST_STEP = 1e-3
@@ -132,7 +139,7 @@ def pose_program(joint: int, is_reversed: bool) -> Pipeline:
         _determinants(parameters),
         _values(parameters),
         *root_steps(parameters),
-        _solutions(parameters, arm),
+        *solving_steps(parameters, _solutions(parameters, arm), _SHARED),
     )
     inputs = (Variable("parameters", (sum(_SIZES),)), Variable("T", (4, 4)))
     return Pipeline("general_pose", inputs, steps, RESULTS)
@@ -337,8 +344,8 @@ def _values(parameters: _SX) -> PipelineStep:
     )
 
 
-def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
-    """Return the step from roots to solutions."""
+def _solutions(parameters: _SX, arm: _Arm) -> Graph:
+    """Return the program from a root to its solution."""
     goal = ca.SX.sym("goal", 4, 4)
     motion = ca.SX.sym("motion", 3, 4)
     six = ca.SX.sym("six", _WITHOUT * 3 * _NEAR)
@@ -370,11 +377,9 @@ def _solutions(parameters: _SX, arm: _Arm) -> PipelineStep:
         **{symbol.name(): symbol for symbol in of_root},
     }
     place = 5 - arm.i if arm.is_reversed else arm.i
-    graph = known_solutions(
+    return known_solutions(
         parameters, inputs, (is_tried, is_real), q, error, closeness, is_delicate, place
     )
-    shared = ("goal", "motion", "six", "reflections", "constant", "R")
-    return PipelineStep(graph, ROOTS, shared={name: name for name in shared})
 
 
 def _near_angles(matrix: list[list[_SX]]) -> tuple[_SX, _SX]:

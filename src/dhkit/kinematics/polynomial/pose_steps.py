@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from itertools import accumulate
 from typing import Any, TypeAlias
@@ -42,15 +42,14 @@ from dhkit.symbolic import Graph, PipelineStep
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
-RESULTS = ("q", "summary", "details", "posed", "error")
-"""Outputs of a pose's program.
+RESULTS = ("sorted_q", "sorted_summary", "sorted_details", "posed", "error")
+"""Outputs of a pose's program; the roots are sorted by their joint values, and those of the kind ``NONE`` are the last.
 
-- ``q``, 16 times 6, rad;
-- ``summary``, 16 times 3: what is known of the root (``NONE``, ``SOLUTION``, ``NEAR_SOLUTION`` or ``DOUBTFUL``), the
-  number by which solutions are sorted, and whether a joint is outside its limits;
-- ``details`` of the root, 16 times 4 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if
-  its solution may be singular or that of another root; the error of its joint values; and more by the way of
-  elimination;
+- joint values, 16 times 6, rad;
+- summary, 16 times 2: what is known of the root (``NONE``, ``SOLUTION``, ``NEAR_SOLUTION`` or ``DOUBTFUL``), and
+  whether a joint is outside its limits;
+- details of the root, 16 times 4 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if its
+  solution may be singular or that of another root; the error of its joint values; and more by the way of elimination;
 - ``posed``, whether T is a pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
@@ -63,6 +62,10 @@ _ON_CIRCLE = 1e-6
 _AT_ROOT = 1e-5
 """Half the distance of a solution from its root, rad, above which it may be that of another root."""
 _COEFFICIENTS = 2 * DEGREE + 1
+_OF_ROOT = ("angle", "is_tried", "is_real", "closeness", "is_idle")
+_OF_SOLUTION = ("q", "summary", "details")
+_BELOW_ALL = 8.0
+"""More than any number by which solutions are sorted, whose largest are near pi."""
 _TOGETHER = 8
 """Numbers whose reciprocals are computed together."""
 
@@ -70,8 +73,8 @@ _TOGETHER = 8
 def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
 
-    Their outputs are ``error``, and of each root ``angle``, rad, ``is_tried``, ``is_real`` and
-    ``closeness``: ``BESIDE`` where another root is near, else 0.
+    Their outputs are ``error``, and of each root, those that :func:`solving_steps` skips last: ``sorted_angle``, rad,
+    ``sorted_is_tried``, ``sorted_is_real`` and ``sorted_closeness``: ``BESIDE`` where another root is near, else 0.
 
     Parameters
     ----------
@@ -83,6 +86,39 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
         _first_estimates(parameters),
         _better_estimates(parameters),
         _angles(parameters),
+        _sorted(parameters, "sorted_roots", "is_idle", dict.fromkeys(_OF_ROOT, 1)),
+    )
+
+
+def solving_steps(
+    parameters: _SX, solutions: Graph, shared: Sequence[str]
+) -> tuple[PipelineStep, ...]:
+    """Return the steps from the outputs of :func:`root_steps` to the sorted results.
+
+    Roots that are neither nearly real nor known to be complex are solved; about half of all roots are not.
+
+    Parameters
+    ----------
+    parameters
+        Symbols of the pipeline's parameters.
+    solutions
+        Program of :func:`known_solutions`.
+    shared
+        Outputs of earlier steps that it uses for all roots.
+    """
+    sizes = {one.name: one.size for one in solutions.outputs}
+    names = {variable.name for variable in solutions.inputs}
+    return (
+        PipelineStep(
+            solutions,
+            ROOTS,
+            each={name: f"sorted_{name}" for name in _OF_ROOT if name in names},
+            shared={name: name for name in shared},
+            skips="sorted_is_idle",
+        ),
+        _sorted(
+            parameters, "sorted_solutions", "key", {name: sizes[name] for name in _OF_SOLUTION}
+        ),
     )
 
 
@@ -166,17 +202,54 @@ def _angles(parameters: _SX) -> PipelineStep:
         "first": first,
         **_inputs_of(index, root, others),
     }
+    # A root that is not tried, but perhaps real, makes its pose doubtful.
+    is_idle = ca.logic_not(ca.logic_or(is_tried, is_real != 0.0))
     outputs = {
         "angle": ca.if_else(is_tried, angle, 0.0) + first,
         "is_tried": ca.if_else(is_tried, 1.0, 0.0),
         "is_real": is_real,
         "closeness": closeness,
+        "is_idle": ca.if_else(is_idle, 1.0, 0.0),
     }
     return PipelineStep(
         Graph.of("angles", inputs, outputs),
         ROOTS,
         each={"index": "index"},
         shared={"numbers": "numbers", "error": "error", "first": "first", "xs": "x", "ys": "y"},
+    )
+
+
+def _sorted(parameters: _SX, name: str, key: str, sizes: Mapping[str, int]) -> PipelineStep:
+    """Return the step that sorts roots by a key, with outputs ``sorted_...`` for those of earlier steps.
+
+    Parameters
+    ----------
+    parameters
+        Symbols of the pipeline's parameters.
+    name
+        Name of its program.
+    key
+        Output of an earlier step: a number of each root.
+    sizes
+        Numbers of entries of the outputs that are sorted, by their names.
+    """
+    index = ca.SX.sym("index")
+    own = ca.SX.sym("own_key")
+    keys = ca.SX.sym("keys", ROOTS)
+    place = ca.SX(0.0)
+    for j, other in enumerate(ca.vertsplit(keys)):
+        # Roots with equal keys stay in their order.
+        is_earlier = ca.logic_and(other == own, float(j) < index)
+        place = place + ca.if_else(ca.logic_or(other < own, is_earlier), 1.0, 0.0)
+    values = {source: ca.SX.sym(source, size) for source, size in sizes.items()}
+    inputs = {"parameters": parameters, "index": index, "own_key": own, "keys": keys, **values}
+    outputs = {f"sorted_{source}": value for source, value in values.items()}
+    return PipelineStep(
+        Graph.of(name, inputs, {**outputs, "place": place}),
+        ROOTS,
+        each={"index": "index", "own_key": key},
+        shared={"keys": key},
+        places="place",
     )
 
 
@@ -224,6 +297,8 @@ def known_solutions(
     around = [ca.if_else(q[k] < SAME_ANGLE - math.pi, q[k] + math.tau, q[k]) for k in range(3)]
     q_1, q_2, q_3 = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
     order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
+    # A number, even where q is none: roots are stored at the places that follow from it.
+    order = ca.if_else(ca.fabs(order) < _BELOW_ALL, order, 0.0)
 
     # lower <= q + 2 pi k <= upper for some whole k.
     lower = parameters[-12:-6] - LIMIT_SLACK
@@ -240,8 +315,10 @@ def known_solutions(
     details = [is_tried, is_real, care, *map(at_tried, (error, *more))]
     outputs = {
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
-        "summary": ca.vertcat(kind, at_tried(order), at_tried(is_outside)),
+        "summary": ca.vertcat(kind, at_tried(is_outside)),
         "details": ca.vertcat(*details),
+        # Roots that are skipped have the key 0.
+        "key": ca.if_else(kind != NONE, at_tried(order) - _BELOW_ALL, 0.0),
     }
     return Graph.of("solutions", inputs, outputs)
 

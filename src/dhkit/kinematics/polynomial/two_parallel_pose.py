@@ -17,8 +17,9 @@ from dhkit.kinematics.polynomial.pose_steps import (
     RESULTS,
     known_solutions,
     root_steps,
+    solving_steps,
 )
-from dhkit.kinematics.polynomial.trigonometric import ROOTS, SAMPLES
+from dhkit.kinematics.polynomial.trigonometric import SAMPLES
 from dhkit.kinematics.polynomial.two_parallel_program import (
     COUNT,
     Numbers,
@@ -47,7 +48,7 @@ def pose_program(meeting: tuple[int, int]) -> Pipeline:
         _prepared(parameters),
         _values(parameters, meeting),
         *root_steps(parameters),
-        _solutions(parameters, meeting),
+        *solving_steps(parameters, _solutions(parameters, meeting), ("goal",)),
     )
     inputs = (Variable("parameters", (COUNT + _LIMITS,)), Variable("T", (4, 4)))
     return Pipeline("two_parallel_pose", inputs, steps, RESULTS)
@@ -91,8 +92,8 @@ def _values(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
     )
 
 
-def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
-    """Return the step from roots to solutions."""
+def _solutions(parameters: _SX, meeting: tuple[int, int]) -> Graph:
+    """Return the program from a root to its solution."""
     goal = ca.SX.sym("goal", 4, 4)
     angle = ca.SX.sym("angle")
     of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "closeness")]
@@ -106,7 +107,7 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
         "angle": angle,
         **{symbol.name(): symbol for symbol in of_root},
     }
-    graph = known_solutions(
+    return known_solutions(
         parameters,
         inputs,
         (is_tried, is_real),
@@ -117,4 +118,3 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> PipelineStep:
         0,
         ca.vertsplit(also),
     )
-    return PipelineStep(graph, ROOTS, shared={"goal": "goal"})

@@ -33,6 +33,12 @@ class PipelineStep:
     most
         Largest number of times that the step is run, until its last output, ``goes_on``, is 0 for all items. Its other
         outputs take the place of earlier ones of the same names.
+    skips
+        Source of a number of each item, or empty: items where it is not 0 have the outputs 0. The step is not run for
+        vectors of such items alone.
+    places
+        Output that is a permutation of the items' numbers, or empty: an item's outputs become those of the item of
+        that number.
     """
 
     graph: Graph
@@ -40,6 +46,14 @@ class PipelineStep:
     each: Mapping[str, str] = field(default_factory=dict)
     shared: Mapping[str, str] = field(default_factory=dict)
     most: int = 1
+    skips: str = ""
+    places: str = ""
+
+    def __post_init__(self) -> None:
+        if self.most > 1 and (self.skips or self.places):
+            raise ValueError(
+                f"{self.graph.name}: a step that is repeated has all items in their order"
+            )
 
     @property
     def outputs(self) -> tuple[Variable, ...]:
