@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -112,6 +114,73 @@ def test_single_calls_give_the_same(of_roots):
     roots, packed = function(np.array([7.0]), None)
     np.testing.assert_allclose(roots, np.sqrt(7.0 + np.arange(ITEMS)), rtol=1e-14)
     assert np.frombuffer(packed)[0] == pytest.approx(POWER * roots.sum(), rel=1e-14)
+
+
+def halves(items):
+    """Return the program of the halves of numbers from the largest to the smallest, of negative ones 0 instead."""
+    factor = ca.SX.sym("factor")
+    x = ca.SX.sym("x", items)
+    index = ca.SX.sym("index")
+    number = ca.SX.sym("number")
+    numbers = ca.SX.sym("numbers", items)
+    half = ca.SX.sym("half")
+    chosen = sum(
+        (ca.if_else(index == float(k), one, 0.0) for k, one in enumerate(ca.vertsplit(x))), ca.SX(0)
+    )
+    larger = sum(
+        (ca.if_else(other > number, 1.0, 0.0) for other in ca.vertsplit(numbers)), ca.SX(0)
+    )
+    parameters = {"parameters": factor}
+    steps = (
+        PipelineStep(
+            Graph.of(
+                "numbers",
+                {**parameters, "index": index, "x": x},
+                {"number": chosen, "is_negative": ca.if_else(chosen < 0.0, 1.0, 0.0)},
+            ),
+            items,
+            each={"index": "index"},
+            shared={"x": "x"},
+        ),
+        PipelineStep(
+            Graph.of("half", {**parameters, "number": number}, {"half": number / factor}),
+            items,
+            skips="is_negative",
+        ),
+        PipelineStep(
+            Graph.of(
+                "sorted",
+                {**parameters, "number": number, "numbers": numbers, "half": half},
+                {"sorted_half": half, "place": larger},
+            ),
+            items,
+            shared={"numbers": "number"},
+            places="place",
+        ),
+    )
+    inputs = (Variable("parameters", (1,)), Variable("x", (items,)))
+    return Pipeline("halves", inputs, steps, ("half", "sorted_half"))
+
+
+@pytest.mark.parametrize("items", [3, 8, 11, 24])
+def test_items_are_skipped_and_sorted(items):
+    of_halves = kernel("test_halves", f"{items}", lambda: halves(items), ("float64",) * 2)
+    rng = np.random.default_rng(5)
+    x = np.stack([rng.permutation(items) - shift for shift in (0.0, items / 2 + 0.1, items + 1.0)])
+    half = np.where(x < 0, 0.0, x / 2)
+    expected = half, np.take_along_axis(half, np.argsort(-x, axis=1), axis=1)
+    for run in (of_halves._interpreted(), of_halves):
+        found = [np.empty((len(x), items)) for _ in range(2)]
+        run(np.array([2.0]), [x], found)
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+        of_halves.compile()
+    assert "compiled" in repr(of_halves)
+
+
+def test_a_repeated_step_neither_skips_nor_sorts():
+    with pytest.raises(ValueError, match="better: a step that is repeated has all items"):
+        replace(square_roots().steps[1], skips="square")
 
 
 def test_inputs_that_do_not_fit_are_refused():

@@ -169,8 +169,8 @@ class PipelineInterpreter:
 def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:
     """Return a program as a CasADi function of (0, parameters, inputs ...), flat.
 
-    The first argument is a symbol for 0. CasADi would simplify x - x and y + 0; with a symbol the first is NaN where x
-    is not finite, and the second has no negative zero.
+    The first argument is a symbol for 0. CasADi would simplify x - x, y + 0 and x (1 / y); with a symbol the first is
+    NaN where x is not finite, the second has no negative zero, and the third remains a product.
     """
     import casadi
 
@@ -196,6 +196,10 @@ def _values(
     """Return the value of every node; ``alike`` with the arc tangent of compiled kernels, not the C library's."""
     import casadi
 
+    def quotient(x: casadi.SX, y: casadi.SX) -> casadi.SX:
+        # Of a product with 1 / y CasADi would make a quotient.
+        return (x + zero if x.is_one() else x) / y
+
     def library_atan2(y: casadi.SX, x: casadi.SX) -> casadi.SX:
         return casadi.atan2(y + zero, x + zero)
 
@@ -207,7 +211,7 @@ def _values(
         "add": operator.add,
         "subtract": operator.sub,
         "multiply": operator.mul,
-        "divide": operator.truediv,
+        "divide": quotient,
         "negate": operator.neg,
         "absolute": casadi.fabs,
         "floor": casadi.floor,

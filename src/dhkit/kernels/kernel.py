@@ -263,7 +263,7 @@ class Kernel:
         """Return the program, derived at the first call."""
         with _deriving:
             if self._graph is None:
-                self._graph = self._derive()
+                self._graph = self._derive().with_reciprocals()
             return self._graph
 
 

@@ -132,9 +132,11 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
 
     body = Body(FUSING, width=1 if step.items == 1 else WIDTH)
     skipped = _skipped(body, step, written) if step.skips else None
-    shared: list[str] = []
+    # What all items share is loaded where it is used. Only what the step writes anew is loaded before the first item.
+    before: list[str] = []
+    changed = {one.name for one in step.outputs}
     parameters = range(step.graph.inputs[0].size)
-    inputs = [_for_all(body, shared, "%parameters", parameters)]
+    inputs = [_for_all(body, body.lines, "%parameters", parameters)]
     for name, variable, (source, is_shared) in zip(
         names, step.graph.inputs[1:], sources, strict=True
     ):
@@ -143,7 +145,8 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
         elif is_shared:
             items, size = pipeline.sizes[source]
             places = [e * _padded(items) + i for e in range(size) for i in range(items)]
-            inputs.append(_for_all(body, shared, name, places))
+            lines = before if source in changed else body.lines
+            inputs.append(_for_all(body, lines, name, places))
         else:
             inputs.append([_loaded(body, name, step, entry) for entry in range(variable.size)])
     results = plain_results(step.graph, body, inputs)
@@ -157,7 +160,7 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
     return [
         f"define internal i1 @step{k}({pointers}) noinline {{",
         "entry:",
-        *shared,
+        *before,
         "  br label %compute",
         "compute:",
         "  %item = phi i64 [0, %entry], [%next, %computed]",

@@ -328,14 +328,14 @@ def _reciprocals(numbers: list[_SX]) -> list[_SX]:
     reciprocals: list[_SX] = []
     for begin in range(0, len(numbers), _TOGETHER):
         part = numbers[begin : begin + _TOGETHER]
-        # before[k] is the product of those before k, and after that of those behind k over that of all.
-        before = list(accumulate(part, operator.mul, initial=ca.SX(1.0)))
-        after = 1.0 / before[-1]
-        found = []
-        for k in reversed(range(len(part))):
-            found.append(before[k] * after)
-            after = after * part[k]
-        reciprocals += reversed(found)
+        # before[k] is the product of those before k, and after[k] that of those behind k. CasADi would make 1 / x of
+        # y / (x y) where it sees the same y: it does not see the product of all in that of two halves.
+        one = ca.SX(1.0)
+        before = list(accumulate(part, operator.mul, initial=one))
+        after = list(accumulate(reversed(part), operator.mul, initial=one))[::-1]
+        half = len(part) // 2
+        product = before[half] * after[half]
+        reciprocals += [before[k] * after[k + 1] / product for k in range(len(part))]
     return reciprocals
 
 

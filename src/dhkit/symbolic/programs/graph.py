@@ -207,6 +207,28 @@ class Graph:
                 pairs[angle] = (k, cosine) if node.operation == "sin" else (sine, k)
         return pairs
 
+    def with_reciprocals(self) -> Graph:
+        """Return the program with one division by each number by which several numbers are divided.
+
+        A division takes as long as some 16 products. CasADi makes x / y of x times 1 / y, even where 1 / y is at hand.
+        Results may differ in their last bit.
+        """
+        divided_by = Counter(node.arguments[1] for node in self.nodes if node.operation == "divide")
+        builder = _Builder()
+        places: list[int] = []
+        for node in self.nodes:
+            if node.operation == "input":  # whose arguments are not nodes
+                places.append(builder.add(node))
+                continue
+            arguments = tuple(places[k] for k in node.arguments)
+            if node.operation == "divide" and divided_by[node.arguments[1]] > 1:
+                places.append(builder.product_with_reciprocal(*arguments))
+            else:
+                places.append(builder.add(replace(node, arguments=arguments)))
+        results = tuple(tuple(places[k] for k in entries) for entries in self.results)
+        nodes, results = _pruned(builder.nodes, results)
+        return replace(self, nodes=nodes, results=results)
+
     def renamed(self, name: str) -> Graph:
         """Return the same program under another name."""
         return replace(self, name=name)
@@ -279,6 +301,12 @@ class _Builder:
         if operation in _COMMUTATIVE:
             arguments = sorted(arguments)
         return self.add(Node(operation, tuple(arguments)))
+
+    def product_with_reciprocal(self, x: int, y: int) -> int:
+        """Return the node of x (1 / y)."""
+        one = self.constant(1.0)
+        reciprocal = self.apply("divide", (one, y))
+        return reciprocal if x == one else self.apply("multiply", (x, reciprocal))
 
     def _sign(self, x: int) -> int:
         """Return the sign of x: 1 if 0 < x, else -1 if x < 0, else x itself, which is 0 or NaN."""

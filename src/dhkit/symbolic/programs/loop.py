@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dhkit.display import repr_line
 from dhkit.symbolic.programs.graph import Graph, Variable
@@ -44,6 +44,15 @@ class Loop:
                 raise ValueError(f"{graph.name}: inputs differ from those of {self.begin.name}")
         if [variable.size for variable in self.step.outputs] != [state, 1]:
             raise ValueError(f"{self.step.name}: outputs are not a state and whether it goes on")
+
+    def with_reciprocals(self) -> Loop:
+        """Return the program with fewer divisions, see :meth:`Graph.with_reciprocals`."""
+        return replace(
+            self,
+            begin=self.begin.with_reciprocals(),
+            step=self.step.with_reciprocals(),
+            finish=self.finish.with_reciprocals(),
+        )
 
     @property
     def name(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from dhkit.display import counted, repr_line
@@ -104,6 +104,11 @@ class Pipeline:
                     )
             for variable in step.outputs:
                 sizes[variable.name] = (step.items, variable.size)
+
+    def with_reciprocals(self) -> Pipeline:
+        """Return the program with fewer divisions, see :meth:`Graph.with_reciprocals`."""
+        steps = tuple(replace(step, graph=step.graph.with_reciprocals()) for step in self.steps)
+        return replace(self, steps=steps)
 
     def source(self, step: PipelineStep, name: str) -> tuple[str, bool]:
         """Return where an input of a step comes from, and whether all items share it."""
