@@ -23,6 +23,8 @@ from dhkit.kinematics.eliminated import (
 from dhkit.kinematics.eliminated_call import EliminatedPoseCall
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import SAME_ANGLE, solve
+from dhkit.kinematics.polynomial.two_parallel_pose import pose_program
+from dhkit.symbolic import operation_count
 from ssik_peer import solutions_of
 
 CLOSES = 1e-12  # share of the reach and rad, away from singularities
@@ -235,6 +237,12 @@ def test_a_pose_that_was_made_is_never_said_to_be_out_of_reach(name, law):
     assert not found.complete
     assert np.mean(found.valid.any(axis=1)) > 0.9
     assert closure(arm, found, arm.fk(q)) < 1e-8
+
+
+def test_a_step_of_aberths_method_divides_four_times():
+    """Of the differences of the roots it takes one reciprocal for eight, unless CasADi undoes it."""
+    steps = {step.graph.name: step.graph for step in pose_program((5, 6)).with_reciprocals().steps}
+    assert operation_count(steps["better_estimates"])["divisions"] == 4
 
 
 def test_a_missing_solution_is_not_called_complete(law):

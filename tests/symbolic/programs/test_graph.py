@@ -12,6 +12,7 @@ from dhkit.symbolic import (
     jacobian,
     jacobian_dot,
     joint_symbols,
+    operation_count,
     table_pattern,
 )
 from random_arms import states, tables
@@ -94,6 +95,20 @@ def test_unused_work_is_dropped_and_matrices_are_row_by_row():
 def test_an_operation_without_a_place_in_programs_is_refused():
     with pytest.raises(ValueError, match="not one of a straight-line program"):
         Graph.of("program", {"x": x}, {"y": casadi.exp(x[0])})
+
+
+def test_kernels_divide_once_by_a_number():
+    length = casadi.sqrt(casadi.sumsqr(x))
+    exact = Graph.of(
+        "unit", {"x": x}, {"unit": x / length, "inverse": 1 / length, "half": x[0] / 2}
+    )
+    fast = exact.with_reciprocals()
+    assert operation_count(exact)["divisions"] == 5
+    assert operation_count(fast)["divisions"] == 2
+    for value in np.random.default_rng(2).normal(size=(20, 3)):
+        for one, other in zip(evaluate(exact, value), evaluate(fast, value), strict=True):
+            np.testing.assert_allclose(one, other, rtol=5e-16)
+    assert fast.with_reciprocals() == fast
 
 
 def test_sine_and_cosine_of_one_angle_are_a_pair():
