@@ -118,9 +118,9 @@ class _SurePoses:
     """Solutions of those of N poses whose roots lie apart and give one solution each, as the program tells."""
 
     q: Array
-    """Sorted solutions, shape (N, 16, 6), rad; NaN where there are fewer."""
+    """Sorted solutions, shape (N, 16, 6), rad; where there are fewer, any numbers follow."""
     flags: NDArray[np.uint8]
-    """Shape (N, 16)."""
+    """Shape (N, 16), likewise."""
     counts: NDArray[np.intp]
     """Number of solutions, shape (N,); 0 of other poses."""
 
@@ -137,7 +137,7 @@ class _SurePoses:
             goals = poses[some]
             others = [np.empty((len(goals), size)) for size in output_sizes(arm.details)[1:]]
             arm.pose_kernel(parameters, [goals], [q[some].reshape(len(goals), -1), *others])
-            flags[some], counts[some] = _read(others, q[some])
+            flags[some], counts[some] = _flags_and_counts(others, q[some])
         return cls(q, flags, counts)
 
     def solutions(
@@ -148,9 +148,9 @@ class _SurePoses:
     ) -> IKSolutions:
         """Return all solutions, with those of other poses in their rows (M,)."""
         B = max(1, int(self.counts.max(initial=0)), 0 if others is None else len(others.branches))
-        q = _with_columns(self.q, B, np.nan)
-        flags = _with_columns(self.flags, B, 0)
         valid = np.arange(B) < self.counts[:, None]
+        q = _columns(self.q, valid, np.nan)
+        flags = _columns(self.flags, valid, 0)
         status = np.full(len(q), IKStatus.ok, dtype=np.uint8)
         distance = np.zeros(len(q))
         complete = True
@@ -175,19 +175,17 @@ class _SurePoses:
         )
 
 
-def _with_columns(table: NDArray[Any], count: int, filling: float) -> NDArray[Any]:
-    """Return the first columns of a table (N, K, ...) as a new one, filled up where there are more than K."""
-    columns = np.full((len(table), count, *table.shape[2:]), filling, dtype=table.dtype)
-    common = min(count, table.shape[1])
+def _columns(table: NDArray[Any], is_kept: NDArray[np.bool_], filling: float) -> NDArray[Any]:
+    """Return the entries (N, B, ...) of a table (N, K, ...) that are kept, shape (N, B), and a filling elsewhere."""
+    columns = np.empty((*is_kept.shape, *table.shape[2:]), dtype=table.dtype)
+    common = min(is_kept.shape[1], table.shape[1])
     columns[:, :common] = table[:, :common]
+    columns[~is_kept] = filling
     return columns
 
 
-def _read(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
-    """Return the flags (N, 16) of sorted solutions of poses, and their numbers (N,), 0 if not sure.
-
-    Of joint values ``q``, shape (N, 16, 6), those that are no solutions become NaN.
-    """
+def _flags_and_counts(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
+    """Return the flags (N, 16) of roots with joint values (N, 16, 6), and the numbers of solutions, 0 if not sure."""
     kinds, are_outside = np.moveaxis(outputs[0].reshape(len(q), ROOTS, 2), -1, 0)
     posed = outputs[2][:, 0]
     error = outputs[3][:, 0]
@@ -203,10 +201,7 @@ def _read(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8], NDArray[np
         is_sure[near[owner[~is_one]]] = False
     counts[~is_sure] = 0
 
-    is_solution = np.arange(ROOTS) < counts[:, None]
-    q[~is_solution] = np.nan
-    is_flagged = is_solution & (are_outside == 1.0)
-    return np.where(is_flagged, _OUT_OF_LIMITS, np.uint8(0)), counts
+    return np.where(are_outside == 1.0, _OUT_OF_LIMITS, np.uint8(0)), counts
 
 
 def _solved_with_care(description: Description, poses: Array) -> IKSolutions:
