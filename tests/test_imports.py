@@ -61,6 +61,14 @@ def test_importing_dhkit_imports_nothing_heavy():
     assert done.stdout.strip() == "[]", done
 
 
+def test_kinematics_import_no_scipy():
+    done = run(
+        "import sys, dhkit, numpy; arm = dhkit.Arm.load('jaco'); arm.ik(arm.fk(numpy.ones(6)));"
+        "print([name for name in sys.modules if name.startswith('scipy')])"
+    )
+    assert done.stdout.strip() == "[]", done
+
+
 def test_the_lab_is_imported_when_it_is_first_used():
     done = run(
         "import sys, dhkit; before = 'dhkit.lab' in sys.modules;"

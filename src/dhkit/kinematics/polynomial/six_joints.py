@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description
+from dhkit.description.poses import turned_about
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.numeric import refined, solve_numerically
@@ -174,12 +174,12 @@ def _displaced(poses: Array, length: float) -> Iterator[Array]:
     rng = np.random.default_rng(0)
     for size in _DISPLACEMENTS:
         phi = size * rng.uniform(-1.0, 1.0, 3)
+        angle = float(np.linalg.norm(phi))
         shift = size * length * rng.uniform(-1.0, 1.0, 3)
         for sign in (1.0, -1.0):
             displaced = poses.reshape(-1, 4, 4).copy()
-            displaced[:, :3, :3] = (
-                Rotation.from_rotvec(sign * phi).as_matrix() @ displaced[:, :3, :3]
-            )
+            R = turned_about(phi / angle, np.array(sign * angle))
+            displaced[:, :3, :3] = R @ displaced[:, :3, :3]
             displaced[:, :3, 3] += sign * shift
             yield displaced.reshape(-1, 16)
 

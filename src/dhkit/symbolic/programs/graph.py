@@ -214,6 +214,8 @@ class Graph:
         Results may differ in their last bit.
         """
         divided_by = Counter(node.arguments[1] for node in self.nodes if node.operation == "divide")
+        if max(divided_by.values(), default=0) < 2:
+            return self
         builder = _Builder()
         places: list[int] = []
         for node in self.nodes:
@@ -224,7 +226,7 @@ class Graph:
             if node.operation == "divide" and divided_by[node.arguments[1]] > 1:
                 places.append(builder.product_with_reciprocal(*arguments))
             else:
-                places.append(builder.add(replace(node, arguments=arguments)))
+                places.append(builder.add(Node(node.operation, arguments, node.value)))
         results = tuple(tuple(places[k] for k in entries) for entries in self.results)
         nodes, results = _pruned(builder.nodes, results)
         return replace(self, nodes=nodes, results=results)
@@ -394,12 +396,9 @@ class _Builder:
 
     def add(self, node: Node) -> int:
         """Return the number of a node, which is appended unless an equal one is there."""
-        # NaN differs from itself; as text all NaN are equal.
-        key = (
-            node.operation,
-            node.arguments,
-            repr(node.value),
-        )
+        # NaN differs from itself; as text all NaN are equal. Only constants have values.
+        value = repr(node.value) if node.operation == "constant" else ""
+        key = (node.operation, node.arguments, value)
         if key not in self._places:
             self._places[key] = len(self.nodes)
             self.nodes.append(node)
