@@ -62,7 +62,7 @@ _ON_CIRCLE = 1e-6
 _AT_ROOT = 1e-5
 """Half the distance of a solution from its root, rad, above which it may be that of another root."""
 _COEFFICIENTS = 2 * DEGREE + 1
-_OF_ROOT = ("angle", "is_tried", "is_real", "closeness", "is_idle")
+_OF_ROOT = ("angle", "is_tried", "is_real", "closeness")
 _OF_SOLUTION = ("q", "summary", "details")
 _BELOW_ALL = 8.0
 """More than any number by which solutions are sorted, whose largest are near pi."""
@@ -73,8 +73,9 @@ _TOGETHER = 8
 def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
 
-    Their outputs are ``error``, and of each root, those that :func:`solving_steps` skips last: ``sorted_angle``, rad,
-    ``sorted_is_tried``, ``sorted_is_real`` and ``sorted_closeness``: ``BESIDE`` where another root is near, else 0.
+    Their outputs are ``error``, and of each root ``sorted_angle``, rad, ``sorted_is_tried``, ``sorted_is_real``,
+    ``sorted_closeness``, ``BESIDE`` where another root is near, else 0, and ``sorted_is_idle``, 1 of a root that is
+    surely complex, else 0. The roots that are surely complex are the last.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
         _first_estimates(parameters),
         _better_estimates(parameters),
         _angles(parameters),
-        _sorted(parameters, "sorted_roots", "is_idle", dict.fromkeys(_OF_ROOT, 1)),
+        _sorted(parameters, "sorted_roots", "is_idle", dict.fromkeys((*_OF_ROOT, "is_idle"), 1)),
     )
 
 
@@ -95,7 +96,7 @@ def solving_steps(
 ) -> tuple[PipelineStep, ...]:
     """Return the steps from the outputs of :func:`root_steps` to the sorted results.
 
-    Roots that are neither nearly real nor known to be complex are solved; about half of all roots are not.
+    Roots that are surely complex, about half of them all, are skipped.
 
     Parameters
     ----------
@@ -107,12 +108,11 @@ def solving_steps(
         Outputs of earlier steps that it uses for all roots.
     """
     sizes = {one.name: one.size for one in solutions.outputs}
-    names = {variable.name for variable in solutions.inputs}
     return (
         PipelineStep(
             solutions,
             ROOTS,
-            each={name: f"sorted_{name}" for name in _OF_ROOT if name in names},
+            each={name: f"sorted_{name}" for name in _OF_ROOT},
             shared={name: name for name in shared},
             skips="sorted_is_idle",
         ),
@@ -297,7 +297,7 @@ def known_solutions(
     around = [ca.if_else(q[k] < SAME_ANGLE - math.pi, q[k] + math.tau, q[k]) for k in range(3)]
     q_1, q_2, q_3 = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
     order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
-    # A number, even where q is none: roots are stored at the places that follow from it.
+    # Finite even where q is NaN: the place at which a root is stored follows from it.
     order = ca.if_else(ca.fabs(order) < _BELOW_ALL, order, 0.0)
 
     # lower <= q + 2 pi k <= upper for some whole k.
