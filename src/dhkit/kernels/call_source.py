@@ -30,6 +30,7 @@ CONTEXT = (
     "none",
     "parameters",
     "PyArray_New",
+    "python_float",
     "PyBytes_FromStringAndSize",
     "PyTuple_Pack",
     "Py_IncRef",
@@ -54,6 +55,8 @@ AXES_OFFSET = 24
 SHAPE_OFFSET = 32
 DTYPE_OFFSET = 56
 FLAGS_OFFSET = 64
+FLOAT_OFFSET = 16
+"""Where the value of a Python ``float`` lies."""
 _BYTES_OFFSET = 32
 """Where the content of a ``bytes`` object begins."""
 
@@ -114,6 +117,34 @@ class _Function:
         self.load(f"{name}_axes", "i32", pointer, AXES_OFFSET)
         self.load(f"{name}_shape", "ptr", pointer, SHAPE_OFFSET)
 
+    def require_number(self, name: str, pointer: str) -> None:
+        """Check that an object is a float of a single item, or an array of shape () or (%items,); define %NAME_data."""
+        self.load(f"{name}_class", "ptr", pointer, TYPE_OFFSET)
+        self.add(
+            f"%{name}_is_number = icmp eq ptr %{name}_class, %python_float",
+            f"br i1 %{name}_is_number, label %{name}_number, label %{name}_array",
+        )
+        self.label(f"{name}_number")
+        self.require("%is_single")
+        self.add(
+            f"%{name}_own = getelementptr i8, ptr {pointer}, i64 {FLOAT_OFFSET}",
+            f"br label %{name}_own_end",
+        )
+        self.label(f"{name}_own_end")
+        self.add(f"br label %{name}_known")
+
+        self.label(f"{name}_array")
+        self.require_array(f"{name}_in_array", pointer)
+        self.require_shape(f"{name}_in_array", ())
+        self.add(f"br label %{name}_array_end")
+        self.label(f"{name}_array_end")
+        self.add(f"br label %{name}_known")
+
+        self.label(f"{name}_known")
+        self.add(
+            f"%{name}_data = phi ptr [%{name}_own, %{name}_own_end], [%{name}_in_array_data, %{name}_array_end]"
+        )
+
     def require_shape(self, name: str, shape: Sequence[int]) -> None:
         """Check the shape of an array: (*shape) of a single item, (%items, *shape) of a batch."""
         self.add(
@@ -155,7 +186,8 @@ def call_source(
 
     The arguments are one array for each input after the parameters, and ``out`` or None. Taken are arrays of float64,
     C-contiguous, of the inputs' shapes, or all with a batch axis of 1 to ``MAX_ITEMS`` items before it
-    (``MAX_IN_LANES`` where :func:`takes_lanes`), and an ``out`` of the result's shape. The result is ``out`` or a new
+    (``MAX_IN_LANES`` where :func:`takes_lanes`), and an ``out`` of the result's shape. An input of shape () may be a
+    float, if the others are of a single item, and is not the first. The result is ``out`` or a new
     array; None of arguments that are not taken, which stay unchanged. Results are NaN by the rule of
     :func:`dhkit.kernels.llvm_source.llvm_source`.
 
@@ -218,6 +250,9 @@ def _call(
     for k, shape in enumerate(shapes):
         if k:
             function.load(f"x{k}", "ptr", "%arguments", 8 * k)
+            if not shape:
+                function.require_number(f"x{k}", f"%x{k}")
+                continue
             function.require_array(f"x{k}", f"%x{k}")
         function.require_shape(f"x{k}", shape)
 

@@ -8,7 +8,17 @@ from itertools import chain
 from typing import TypeAlias
 
 from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
-from dhkit.kernels.vectors import WIDTH, Body, Mask, Vector, absolute, floor, select, sqrt
+from dhkit.kernels.vectors import (
+    WIDTH,
+    Body,
+    Mask,
+    Vector,
+    absolute,
+    floor,
+    gathered,
+    select,
+    sqrt,
+)
 from dhkit.symbolic import Graph, Loop
 
 FLOAT = "float64"
@@ -18,9 +28,10 @@ SMALL_INTEGER = "uint8"
 STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
 """LLVM's names of these types."""
 
-_Value: TypeAlias = Vector | Mask
+Value: TypeAlias = Vector | Mask
+"""Numbers, or truth values."""
 
-_NUMERIC: Mapping[str, Callable[..., _Value]] = {
+_NUMERIC: Mapping[str, Callable[..., Value]] = {
     "add": operator.add,
     "subtract": operator.sub,
     "multiply": operator.mul,
@@ -67,15 +78,21 @@ def result_values(
         not finite.
     """
     outputs = plain_results(graph, body, inputs)
-    missing: Vector | None = None  # 0, or NaN where an input is not finite
-    for x in chain.from_iterable(inputs[1:]):
-        missing = x - x if missing is None else missing + (x - x)
+    missing = zero_or_missing(inputs)
     if missing is None:
         return outputs
     for k, kind in enumerate(types):
         if kind == FLOAT:
             outputs[k] = [entry + missing for entry in outputs[k]]
     return outputs
+
+
+def zero_or_missing(inputs: Sequence[Sequence[Vector]]) -> Vector | None:
+    """Return 0, or NaN where an entry of an input after the parameters is not finite; None without such inputs."""
+    missing: Vector | None = None
+    for x in chain.from_iterable(inputs[1:]):
+        missing = x - x if missing is None else missing + (x - x)
+    return missing
 
 
 def plain_results(
@@ -142,9 +159,9 @@ def loop_values(
     return plain_results(loop.finish, body, [*inputs, fixed, after])
 
 
-def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[_Value]:
+def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -> list[Value]:
     """Return the value of every node."""
-    values: dict[int, _Value] = {}
+    values: dict[int, Value] = {}
     pairs = graph.angle_pairs
 
     def evaluate(k: int) -> None:
@@ -156,9 +173,9 @@ def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -
             values[k] = inputs[variable][entry]
         elif node.operation in ("sin", "cos"):
             angle = node.arguments[0]
-            values.update(zip(pairs[angle], sincos(_number(values[angle])), strict=True))
+            values.update(zip(pairs[angle], sincos(as_number(values[angle])), strict=True))
         else:
-            values[k] = _apply(node.operation, [values[j] for j in node.arguments])
+            values[k] = apply(node.operation, [values[j] for j in node.arguments])
 
     if body.width == 1:
         # The sines of one item's angles are computed together, an angle in each lane of a vector.
@@ -166,9 +183,7 @@ def _node_values(graph: Graph, body: Body, inputs: Sequence[Sequence[Vector]]) -
         for k in first:
             evaluate(k)
         angles = [angle for angle in pairs if angle in first]
-        results = _sincos_in_lanes(body, [_number(values[angle]) for angle in angles])
-        for angle, both in zip(angles, results, strict=True):
-            values.update(zip(pairs[angle], both, strict=True))
+        values.update(sines_and_cosines(graph, body, values, angles))
     for k in range(len(graph.nodes)):
         if k not in values:
             evaluate(k)
@@ -186,38 +201,44 @@ def _before_sines(graph: Graph) -> list[int]:
     return sorted(found)
 
 
-def _sincos_in_lanes(body: Body, angles: Sequence[Vector]) -> list[tuple[Vector, Vector]]:
-    """Return sine and cosine of single numbers, computed as the lanes of vectors."""
-    results: list[tuple[Vector, Vector]] = []
+def sines_and_cosines(
+    graph: Graph, body: Body, values: Mapping[int, Value], angles: Sequence[int]
+) -> dict[int, Value]:
+    """Return the nodes of sine and cosine of one item's angles with their values, computed in the lanes of vectors.
+
+    Parameters
+    ----------
+    graph, body
+        The program, and where the operations are written.
+    values
+        The values of nodes that are known.
+    angles
+        The angles' nodes.
+    """
+    found: dict[int, Value] = {}
     lanes = Body(body.liberties, WIDTH, body.lines)
     for start in range(0, len(angles), WIDTH):
         part = angles[start : start + WIDTH]
-        name = "poison"
-        for lane in range(WIDTH):
-            # Lanes that are left over repeat the last angle.
-            angle = part[min(lane, len(part) - 1)]
-            insert = f"insertelement {lanes.number_type} {name}, double {angle.name}, i64 {lane}"
-            name = body.define(insert)
-        sine, cosine = sincos(Vector(lanes, name))
-
-        def entry(of: Vector, lane: int) -> Vector:
-            extract = f"extractelement {lanes.number_type} {of.name}, i64 {lane}"
-            return Vector(body, body.define(extract))
-
-        results += [(entry(sine, lane), entry(cosine, lane)) for lane in range(len(part))]
-    return results
+        # Lanes that are left over repeat the last angle.
+        filled = [*part, *[part[-1]] * (WIDTH - len(part))]
+        sine, cosine = sincos(gathered(lanes, [as_number(values[k]) for k in filled]))
+        for lane, angle in enumerate(part):
+            both = (sine.lane(body, lane), cosine.lane(body, lane))
+            found.update(zip(graph.angle_pairs[angle], both, strict=True))
+    return found
 
 
-def _apply(operation: str, arguments: Sequence[_Value]) -> _Value:
+def apply(operation: str, arguments: Sequence[Value]) -> Value:
+    """Write an operation of a program, but for sine and cosine, and return its value."""
     if operation == "select":
         condition, true, false = arguments
-        return select(_mask(condition), _number(true), _number(false))
+        return select(_mask(condition), as_number(true), as_number(false))
     if operation in _LOGICAL:
         return _LOGICAL[operation](*map(_mask, arguments))
-    return _NUMERIC[operation](*map(_number, arguments))
+    return _NUMERIC[operation](*map(as_number, arguments))
 
 
-def _number(value: _Value) -> Vector:
+def as_number(value: Value) -> Vector:
     """Return a value as numbers: 1 for true, 0 for false."""
     return (
         value
@@ -226,10 +247,10 @@ def _number(value: _Value) -> Vector:
     )
 
 
-def _numbers(values: Sequence[_Value], places: Sequence[int]) -> list[Vector]:
-    return [_number(values[place]) for place in places]
+def _numbers(values: Sequence[Value], places: Sequence[int]) -> list[Vector]:
+    return [as_number(values[place]) for place in places]
 
 
-def _mask(value: _Value) -> Mask:
+def _mask(value: Value) -> Mask:
     """Return a value as truth values: numbers other than 0 are true."""
     return value if isinstance(value, Mask) else value.differs(0.0)

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 
+from dhkit.kernels.branch_lanes import branch_results
 from dhkit.kernels.lowering import FLOAT, SMALL_INTEGER, STORED, loop_values, result_values
 from dhkit.kernels.pipeline_source import pipeline_source
-from dhkit.kernels.vectors import EXACT, FUSING, Body, Vector
-from dhkit.symbolic import Loop, Pipeline, Program
+from dhkit.kernels.vectors import EXACT, FUSING, WIDTH, Body, Vector
+from dhkit.symbolic import Graph, Loop, Pipeline, Program
 
 
 def run_source(program: Program, types: Sequence[str], *, refuses_nan: bool = False) -> list[str]:
@@ -39,6 +40,8 @@ def run_source(program: Program, types: Sequence[str], *, refuses_nan: bool = Fa
     ]
     if isinstance(program, Loop):
         outputs = loop_values(program, body, inputs)
+    elif program.branches > 1:
+        outputs = branch_results(program, body, inputs, types)
     else:
         outputs = result_values(program, body, inputs, types)
 
@@ -52,8 +55,7 @@ def run_source(program: Program, types: Sequence[str], *, refuses_nan: bool = Fa
         body.lines.append("  br label %store")
     pointers = [*_input_names(program), *(f"y{k}" for k in range(len(outputs)))]
     return [
-        *body.declarations(),
-        *Body().declarations(),
+        *_declarations(program),
         f"define internal i1 @run({', '.join(f'ptr %{pointer}' for pointer in pointers)}) {{",
         "begin:",
         *body.lines,
@@ -67,6 +69,14 @@ def run_source(program: Program, types: Sequence[str], *, refuses_nan: bool = Fa
         "  ret i1 false",
         "}",
     ]
+
+
+def _declarations(program: Program) -> list[str]:
+    """Return the declarations of LLVM's functions for single numbers, vectors and branches in lanes."""
+    widths = {1, WIDTH}
+    if isinstance(program, Graph):
+        widths.add(max(program.branches, 1))
+    return [line for width in sorted(widths) for line in Body(width=width).declarations()]
 
 
 def item_source(program: Loop | Pipeline, types: Sequence[str]) -> str:

@@ -18,7 +18,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array
 from dhkit.display import repr_line
@@ -29,6 +29,7 @@ from dhkit.kernels.call_source import (
     DATA_OFFSET,
     DTYPE_OFFSET,
     FLAGS_OFFSET,
+    FLOAT_OFFSET,
     SHAPE_OFFSET,
     TYPE_OFFSET,
     state_shapes,
@@ -90,7 +91,7 @@ class SingleCall:
         tail: tuple[int, ...],
         install: Callable[[FastCall], None],
         refuses_nan: bool = False,
-        example: Sequence[Array] | None = None,
+        example: Sequence[ArrayLike] | None = None,
     ) -> None:
         self._kernel = kernel
         self._parameters = parameters
@@ -152,7 +153,7 @@ class SingleCall:
     def _agrees(self, function: FastCall) -> bool:
         """Whether a function gives the kernel's results at the example, and takes no list."""
         graph = self._kernel.program()
-        states = self._example or _different_states(state_shapes(graph))
+        states = [np.asarray(x) for x in self._example or _different_states(state_shapes(graph))]
         kinds = zip(graph.outputs, self._kernel.types, strict=True)
         expected: list[NDArray[Any]] = [np.empty((1, output.size), kind) for output, kind in kinds]
         rows = [state.reshape(1, -1) for state in states]
@@ -249,7 +250,8 @@ def _bound(code: CompiledCall, lanes: CompiledFunction | None, parameters: Array
             id(None),
             numbers.ctypes.data,
             _numpy_interface()[_NEW_ARRAY],
-            *map(_python_function, CONTEXT[5:-1]),
+            id(float),
+            *map(_python_function, CONTEXT[6:-1]),
             0 if lanes is None else lanes.address,
         ],
         dtype=np.uintp,
@@ -299,6 +301,7 @@ def _has_known_layout() -> bool:
     if abi != _NUMPY_ABI or interface[_ARRAY_TYPE] != id(np.ndarray):
         return False
     array = np.zeros((2, 3, 5))
+    number = 1.5
     shape = _read(id(array) + SHAPE_OFFSET, ctypes.c_void_p)
     return (
         _read(id(array) + TYPE_OFFSET, ctypes.c_void_p) == id(np.ndarray)
@@ -307,6 +310,7 @@ def _has_known_layout() -> bool:
         and tuple(_read(shape + 8 * k, ctypes.c_int64) for k in range(3)) == array.shape
         and _read(id(array) + DTYPE_OFFSET, ctypes.c_void_p) == id(np.dtype(np.float64))
         and _read(id(array) + FLAGS_OFFSET, ctypes.c_int) == array.flags.num
+        and _read(id(number) + FLOAT_OFFSET, ctypes.c_double) == number
     )
 
 

@@ -6,8 +6,9 @@ A body's values are vectors of several doubles, one for each item of a batch, or
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
-from typing import TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self, TypeAlias, TypeVar
 
 WIDTH = 8
 """Number of doubles of a vector: one register of AVX-512, two of AVX, four of SSE and NEON."""
@@ -52,6 +53,11 @@ class Body:
         (bits,) = struct.unpack("<Q", struct.pack("<d", value))
         return f"0x{bits:016X}" if self.width == 1 else f"splat (double 0x{bits:016X})"
 
+    def constants(self, values: Sequence[float]) -> str:
+        """Return doubles as LLVM's text of a vector, one for each lane."""
+        bits = (struct.unpack("<Q", struct.pack("<d", value))[0] for value in values)
+        return f"<{', '.join(f'double 0x{pattern:016X}' for pattern in bits)}>"
+
     def define(self, instruction: str) -> str:
         """Append an instruction and return the name of its value."""
         name = f"%v{len(self.lines)}"
@@ -59,16 +65,42 @@ class Body:
         return name
 
 
+_Kind = TypeVar("_Kind", bound="Lanes")
+
+
 @dataclass(frozen=True, eq=False)
-class Vector:
+class Lanes:
+    """As many doubles, or truth values, as the body's width."""
+
+    body: Body
+    name: str
+    """Name of the value, or text of a constant."""
+
+    @property
+    def type(self) -> str:
+        """LLVM's type of the value."""
+        raise NotImplementedError
+
+    def lane(self, body: Body, k: int) -> Self:
+        """Return what is in a lane, as a value of a body of width 1."""
+        return replace(
+            self,
+            body=body,
+            name=body.define(f"extractelement {self.type} {self.name}, i64 {k}"),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Vector(Lanes):
     """As many doubles as the body's width.
 
     Comparisons with ``<``, ``<=``, :meth:`equals` and :meth:`differs` return a :class:`Mask`.
     """
 
-    body: Body
-    name: str
-    """Name of the value, or text of a constant."""
+    @property
+    def type(self) -> str:
+        """LLVM's type of the value."""
+        return self.body.number_type
 
     def _with(self, instruction: str, other: Number, *, swapped: bool = False) -> str:
         operands = [self.name, _text(self.body, other)]
@@ -130,11 +162,13 @@ Number: TypeAlias = Vector | float
 
 
 @dataclass(frozen=True, eq=False)
-class Mask:
+class Mask(Lanes):
     """As many truth values as the body's width."""
 
-    body: Body
-    name: str
+    @property
+    def type(self) -> str:
+        """LLVM's type of the value."""
+        return self.body.truth_type
 
     def __and__(self, other: Mask) -> Mask:
         return Mask(
@@ -149,6 +183,31 @@ class Mask:
     def __invert__(self) -> Mask:
         true = "true" if self.body.width == 1 else "splat (i1 true)"
         return Mask(self.body, self.body.define(f"xor {self.body.truth_type} {self.name}, {true}"))
+
+
+def spread(lanes: Body, value: _Kind) -> _Kind:
+    """Return a single value in all lanes."""
+    kind = replace(value, body=lanes).type
+    first = lanes.define(f"insertelement {kind} poison, {value.type} {value.name}, i64 0")
+    copied = f"shufflevector {kind} {first}, {kind} poison, <{lanes.width} x i32> zeroinitializer"
+    return replace(value, body=lanes, name=lanes.define(copied))
+
+
+def gathered(lanes: Body, values: Sequence[_Kind]) -> _Kind:
+    """Return single values, all numbers or all truth values, one in each lane."""
+    result = replace(values[0], body=lanes, name="poison")
+    for lane, value in enumerate(values):
+        filled = f"insertelement {result.type} {result.name}, {value.type} {value.name}, i64 {lane}"
+        result = replace(result, name=lanes.define(filled))
+    return result
+
+
+def chosen_lanes(condition: Sequence[bool], true: _Kind, false: _Kind) -> _Kind:
+    """Return one value's lanes where a condition holds, and another's elsewhere; both are of one kind."""
+    body = true.body
+    lanes = ", ".join(f"i1 {str(holds).lower()}" for holds in condition)
+    values = f"{true.type} {true.name}, {false.type} {false.name}"
+    return replace(true, name=body.define(f"select {body.truth_type} <{lanes}>, {values}"))
 
 
 def _text(body: Body, number: Number) -> str:

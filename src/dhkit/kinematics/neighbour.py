@@ -84,7 +84,7 @@ def solve_from_neighbour(
     poses = np.asarray(T, dtype=float)
     batch = poses.shape[:-2]
     solver = _neighbour(description)
-    free = free_angles(description, solver.fit, seed, batch).reshape(-1, 2)
+    free = free_angles(description, solver.fit, seed, batch).reshape(2, -1)
     rows = poses.reshape(-1, 4, 4)
     posed = are_poses(rows)
 
@@ -94,7 +94,7 @@ def solve_from_neighbour(
     for begin in range(0, len(rows), _CHUNK):
         some = begin + np.flatnonzero(posed[begin : begin + _CHUNK])
         q[some, :-1], flags[some, :-1] = _refined_branches(
-            description, solver, rows[some], free[some]
+            description, solver, rows[some], free[:, some]
         )
 
     missing = (
@@ -198,7 +198,7 @@ def _starts(
     # The first displaced pose at which a branch has a solution gives its start.
     lacking = np.flatnonzero(~exact.valid.all(axis=1))
     for displaced in _displaced(description, poses[lacking]):
-        near = solve_in_closed_form(description, solver, displaced, free[lacking])
+        near = solve_in_closed_form(description, solver, displaced, free[:, lacking])
         is_missing = np.isnan(q[lacking]).any(axis=-1)
         new = near.valid & is_missing
         row, branch = np.nonzero(new)
@@ -228,7 +228,7 @@ def _largest_miss(description: Description) -> float:
     span = np.where(description.numbers.prismatic, Axes.of(description).scale, np.pi)
     states = np.random.default_rng(0).uniform(-span, span, (_SAMPLES, description.n))
     T = world_to_tool(description, states)
-    found = solve_in_closed_form(description, solver, T, np.zeros((_SAMPLES, 2)))
+    found = solve_in_closed_form(description, solver, T, np.zeros((2, _SAMPLES)))
 
     goals = np.broadcast_to(T[:, None], (*found.valid.shape, 4, 4))[found.valid]
     newton = Newton.of(description, position_only=False, limits=False)

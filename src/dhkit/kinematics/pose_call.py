@@ -14,8 +14,8 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import Solver, has_offset_wrist, solver_for, solver_of
 
-_NO_SEED = np.zeros(2)
-"""Angles of free joints without a seed, rad."""
+_NO_SEED = 0.0
+"""Angle of a free joint without a seed, rad."""
 _ZERO = bytes(8)
 """The distance 0.0 m, with which the packed outputs of a pose that is reached begin."""
 
@@ -45,7 +45,7 @@ class PoseCall:
             solver.parameters,
             (B, description.n),
             install=self._install,
-            example=[world_to_tool(description, middle), _NO_SEED],
+            example=[world_to_tool(description, middle), _NO_SEED, _NO_SEED],
         )
 
     def _install(self, call: FastCall) -> None:
@@ -66,17 +66,17 @@ class PoseCall:
         out
             Array for the joint values, shape (..., B, n), rad and m.
         """
-        no_seed = _NO_SEED
+        no_seed: float | Array = _NO_SEED
         shared = self.shared
         if type(T) is np.ndarray and T.ndim == 3:
             if len(T) > MAX_ITEMS or T.shape[1:] != (4, 4):
                 return None
-            no_seed = np.zeros((len(T), 2))
+            no_seed = np.zeros(len(T))
             shared = {**shared, "batch": (len(T),)}
         if self._needs_reach and out is not None and _may_share_memory(T, out):
             # The ordinary way may still need T.
             return None
-        found = self.call(T, no_seed, out)
+        found = self.call(T, no_seed, no_seed, out)
         if found is None:
             return None
         q, packed = found
@@ -113,19 +113,15 @@ class RedundantCall:
         redundancy
             The redundancy, rad; a float is taken.
         """
-        if type(redundancy) is not float or type(T) is not np.ndarray or T.ndim != 2:
-            return None
-        free = _NO_SEED.copy()
-        free[1] = redundancy
-        found = self._poses.call(T, free, None)
-        # The ordinary way tells a pose that another redundancy may reach from others.
+        poses = self._poses
+        found = poses.call(T, _NO_SEED, redundancy, None)
         if found is None:
             return None
         q, packed = found
+        # The ordinary way tells a pose that another redundancy may reach from others.
         if packed[-1] not in _REACHED:
             return None
-        shared = self._poses.shared
-        return IKSolutions.of_packed(q, packed, shared, False, free[1, ...])
+        return IKSolutions.of_packed(q, packed, poses.shared, False, np.array(redundancy))
 
 
 def _may_share_memory(T: Any, out: Any) -> bool:

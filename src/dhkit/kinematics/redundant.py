@@ -189,7 +189,7 @@ class AtRedundancy:
         """Return the solutions of poses (..., 4, 4) at redundancies (...), rad; ``out`` is for closed forms."""
         if isinstance(self.method, Description):
             return self._by_elimination(self.method, T, values)
-        free = np.stack([np.zeros(values.shape), values], axis=-1)
+        free = np.stack([np.zeros(values.shape), values])
         found = solve_in_closed_form(self.description, self.method, T, free, out, threads)
         # Another value may have a solution.
         status = np.where(

@@ -70,7 +70,7 @@ def solve_in_closed_form(
     poses
         Poses of the tool in the world, shape (..., 4, 4), m.
     free
-        Angles of free joints, shape (..., 2), rad: see :func:`free_angles`.
+        Angles of the two joints that may be free, shape (2, ...), rad: see :func:`free_angles`.
     out, threads
         As for :func:`dhkit.kinematics.inverse_kinematics`.
     """
@@ -95,10 +95,8 @@ def solve_in_closed_form(
             status.reshape(count, 1),
         ]
         # Kernels read arrays without gaps; those that broadcasting made have none of their own.
-        inputs = [
-            np.ascontiguousarray(poses.reshape(count, 16)),
-            np.ascontiguousarray(free.reshape(count, 2)),
-        ]
+        columns = (poses.reshape(count, 16), *free.reshape(2, count, 1))
+        inputs = [np.ascontiguousarray(column) for column in columns]
         solver.kernel(solver.parameters, inputs, rows, threads)
         # A single call has no time to look for others.
         is_one_in_reach = count == 1 and distance.item() == 0.0
@@ -140,9 +138,9 @@ def has_offset_wrist(fit: Fit) -> bool:
 def free_angles(
     description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]
 ) -> Array:
-    """Return the angles that joint 1 and the wrist's free joint take where they are free, shape (..., 2), rad."""
+    """Return the angles that joint 1 and the wrist's free joint take where they are free, shape (2, ...), rad."""
     if seed is None:
-        return np.zeros((*batch, 2))
+        return np.zeros((2, *batch))
     start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
     try:
         joints = joint_array(description, start, "seed")[..., [0, fit.free_joint or 0]]
@@ -151,4 +149,5 @@ def free_angles(
         raise ValueError(
             f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}"
         ) from None
-    return np.ascontiguousarray(np.where(np.abs(angles) <= EXACT_RANGE, angles, 0.0))
+    angles = np.where(np.abs(angles) <= EXACT_RANGE, angles, 0.0)
+    return np.ascontiguousarray(np.moveaxis(angles, -1, 0))

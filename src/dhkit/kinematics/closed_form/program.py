@@ -19,37 +19,49 @@ from dhkit.symbolic import Graph
 
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
-    """Return the program of a family: T (4 x 4) and the free joints' angles to q, distance, valid, flags and status.
+    """Return the program of a family: T (4 x 4), ``free_1`` and ``free`` to q, distance, valid, flags and status.
 
-    The program's parameters are ``fit.vector()`` followed by ``limit_parameters``.
+    The program's parameters are ``fit.vector()`` followed by ``limit_parameters``. ``free_1`` and ``free`` are the
+    angles of :class:`PoseSymbols` of these names, rad.
     """
     symbols = ca.SX.sym("p", len(fit.vector()))
     limits = ca.SX.sym("limits", 2 * len(prismatic))
-    return _graph(
-        family,
-        fit,
-        prismatic,
-        fit.named(symbols),
-        limits,
-        {"parameters": ca.vertcat(symbols, limits)},
+    T = ca.SX.sym("T", 4, 4)
+    free = (ca.SX.sym("free_1"), ca.SX.sym("free"))
+    return Graph.of(
+        "inverse_kinematics",
+        {"parameters": ca.vertcat(symbols, limits), "T": T, "free_1": free[0], "free": free[1]},
+        _outputs(family, fit, prismatic, fit.named(symbols), limits, T, free),
+        {"free_1": (), "free": ()},
+        branches=len(fit.branches),
     )
 
 
 def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
-    """Return the program with an arm's parameters and ``limits`` (2n,), rad and m, as constants."""
-    return _graph(family, fit, prismatic, fit.named(ca.SX(fit.vector())), ca.SX(limits), {})
+    """Return the program with an arm's parameters and ``limits`` (2n,), rad and m, as constants.
+
+    Both free angles are one input of two entries.
+    """
+    T = ca.SX.sym("T", 4, 4)
+    free = ca.SX.sym("free", 2)
+    named = fit.named(ca.SX(fit.vector()))
+    return Graph.of(
+        "inverse_kinematics",
+        {"T": T, "free": free},
+        _outputs(family, fit, prismatic, named, ca.SX(limits), T, (free[0], free[1])),
+    )
 
 
-def _graph(
+def _outputs(
     family: Family,
     fit: Fit,
     prismatic: Sequence[bool],
     named: Mapping[str, SX],
     limits: ca.SX,
-    parameters: Mapping[str, ca.SX],
-) -> Graph:
-    T = ca.SX.sym("T", 4, 4)
-    free = ca.SX.sym("free", 2)
+    T: ca.SX,
+    free: tuple[SX, SX],
+) -> dict[str, ca.SX]:
+    """Return q, distance, valid, flags and status of all branches."""
     posed = is_pose(T)
     scale = named["reach"] + ca.norm_1(T[:3, 3])
     pose = PoseSymbols(
@@ -83,17 +95,13 @@ def _graph(
     reached = if_else(reduce(ca.logic_or, singular), float(IKStatus.singular), float(IKStatus.ok))
     status = if_else(some, reached, float(IKStatus.out_of_reach))
     distance = if_else(some, 0.0, reduce(ca.fmin, distances))
-    return Graph.of(
-        "inverse_kinematics",
-        {**parameters, "T": T, "free": free},
-        {
-            "q": ca.vertcat(*q),
-            "distance": if_else(posed, distance, np.nan),
-            "valid": ca.vertcat(*(if_else(is_valid, 1.0, 0.0) for is_valid in valid)),
-            "flags": ca.vertcat(*flags),
-            "status": if_else(posed, status, float(IKStatus.not_a_pose)),
-        },
-    )
+    return {
+        "q": ca.vertcat(*q),
+        "distance": if_else(posed, distance, np.nan),
+        "valid": ca.vertcat(*(if_else(is_valid, 1.0, 0.0) for is_valid in valid)),
+        "flags": ca.vertcat(*flags),
+        "status": if_else(posed, status, float(IKStatus.not_a_pose)),
+    }
 
 
 def _is_finite(branch: Branch) -> Any:

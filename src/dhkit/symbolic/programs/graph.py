@@ -145,6 +145,8 @@ class Graph:
     nodes: tuple[Node, ...]
     results: tuple[tuple[int, ...], ...]
     """Nodes of each output's entries, row by row."""
+    branches: int = 0
+    """Number of branches, whose operations are alike but for signs: outputs with as many rows have a row for each."""
 
     @classmethod
     def of(
@@ -153,6 +155,7 @@ class Graph:
         inputs: Mapping[str, casadi.SX],
         outputs: Mapping[str, casadi.SX],
         shapes: Mapping[str, tuple[int, ...]] | None = None,
+        branches: int = 0,
     ) -> Graph:
         """Return the program of CasADi expressions; equal operations are merged, operations on constants evaluated.
 
@@ -164,6 +167,8 @@ class Graph:
             Symbols and expressions by name; matrices are taken row by row.
         shapes
             Shapes to state instead of CasADi's (rows, columns).
+        branches
+            See the class.
 
         Raises
         ------
@@ -194,6 +199,7 @@ class Graph:
             ),
             nodes=nodes,
             results=results,
+            branches=branches,
         )
 
     @property
