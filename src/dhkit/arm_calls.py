@@ -16,6 +16,7 @@ from dhkit.dynamics.regressor import (
 )
 from dhkit.errors import DhkitError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
+from dhkit.kinematics.arm_angle_intervals import arm_angle_intervals
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import (
@@ -169,6 +170,9 @@ class ArmCalls:
             self.ik.compile()
         if isinstance(self.ik_at_redundancy, RedundantCall):
             self.ik_at_redundancy.compile()
+        intervals = arm_angle_intervals(self._description)
+        if intervals is not None:
+            intervals.compile()
         yield "ik"
         if isinstance(self.ik_numeric, NumericCall):
             self.ik_numeric.compile()

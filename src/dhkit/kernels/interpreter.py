@@ -148,7 +148,7 @@ class PipelineInterpreter:
                     elif is_shared:
                         x = np.tile(known[source].T.ravel(), (step.items, 1))
                     else:
-                        x = known[source]
+                        x = known[source].T.reshape(variable.size, step.items).T
                     rows.append(np.ascontiguousarray(x))
                 results = [np.empty((step.items, one.size)) for one in step.graph.outputs]
                 run(parameters, rows, results)

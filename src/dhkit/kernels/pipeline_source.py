@@ -148,6 +148,9 @@ def _function(pipeline: Pipeline, k: int) -> list[str]:
             lines = before if source in changed else body.lines
             inputs.append(_for_all(body, lines, name, places))
         else:
+            items, _ = pipeline.sizes[source]
+            if items != step.items and step.items != _padded(step.items):
+                raise ValueError(f"{step.graph.name}: {source} does not fill whole vectors")
             inputs.append([_loaded(body, name, step, entry) for entry in range(variable.size)])
     results = plain_results(step.graph, body, inputs)
     if skipped is not None:

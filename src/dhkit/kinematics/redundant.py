@@ -31,6 +31,7 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import collect
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.family import LAST_JOINT
 from dhkit.kinematics.closed_form.formulas import MIN_DIRECTION
 from dhkit.kinematics.eliminated import elimination_kernels, solve_by_elimination
 from dhkit.kinematics.manipulability import manipulability
@@ -41,7 +42,6 @@ from dhkit.kinematics.solver import Solver, solve_in_closed_form, solver_for
 
 JOINTS = 7
 _LAST = JOINTS - 1
-LAST_JOINT = "joint 7"
 _TRIED = 32
 """Number of steps between the values that are tried where none is asked for."""
 _WHOLE_TURN = (-np.pi, np.pi)

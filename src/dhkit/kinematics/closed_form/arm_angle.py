@@ -10,6 +10,7 @@ limits, IEEE Trans. Robotics 24; there psi is that of the elbow).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import product
 
 from dhkit.kinematics.axes import Axes
@@ -67,26 +68,11 @@ def arm_angle_fit(axes: Axes) -> Fit | None:
 
 def arm_angle_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches at psi = ``pose.free``: joint 4 bent to either side, then joint 6, then joint 2."""
-    T = pose.seen(p["T_first_world"], p["T_tool_last"])
-    # The last frame has its origin in W: it is on axis 7, and a_6 = d_6 = 0.
-    line = _line_frame(T.position, pose)
-
     branches: list[Branch] = []
-    for bend in SIGNS:
-        elbow = elbow_bent(p, T.position, bend, pose)
-        in_link_3 = _triangle_frame(p, elbow)
-
-        # Vectors of link 3 in frame 0 and back: their coordinates in the triangle's directions stay.
-        z_3 = _carried(turned_about_x((0.0, 0.0, 1.0), p["alpha3"], -1.0), in_link_3, line)
-        x_3 = _carried((1.0, 0.0, 0.0), in_link_3, line)
-        z_7, x_7 = (
-            turned_about_x(
-                turned_about_z(_carried(axis, line, in_link_3), elbow.theta_4, -1.0),
-                p["alpha4"],
-                -1.0,
-            )
-            for axis in (T.rotation[2], T.rotation[0])
-        )
+    for arm in bent_arms(p, pose):
+        elbow = arm.elbow
+        x_3, _, z_3 = arm.shoulder
+        x_7, _, z_7 = arm.wrist
         for side in SIGNS:
             wrist, wrist_is_singular = three_joints(z_7, x_7, (p["alpha5"], p["alpha6"]), side)
             for tilt in SIGNS:
@@ -108,6 +94,47 @@ def arm_angle_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
                     )
                 )
     return branches
+
+
+@dataclass(frozen=True)
+class BentArm:
+    """Joint 4 bent to one side, and the rotations that the other joints make; their columns are x, y and z axes.
+
+    All entries of the rotations are a + b cos(psi) + c sin(psi).
+    """
+
+    elbow: Elbow
+    shoulder: tuple[Vector, Vector, Vector]
+    """Rz(theta_1) Rx(alpha_1) Rz(theta_2) Rx(alpha_2) Rz(theta_3)."""
+    wrist: tuple[Vector, Vector, Vector]
+    """Rz(theta_5) Rx(alpha_5) Rz(theta_6) Rx(alpha_6) Rz(theta_7)."""
+
+
+def bent_arms(p: Mapping[str, SX], pose: PoseSymbols) -> list[BentArm]:
+    """Return the arm with joint 4 bent to either side, at psi = ``pose.free``."""
+    T = pose.seen(p["T_first_world"], p["T_tool_last"])
+    # The last frame has its origin in W: it is on axis 7, and a_6 = d_6 = 0.
+    line = _line_frame(T.position, pose)
+    arms = []
+    for bend in SIGNS:
+        elbow = elbow_bent(p, T.position, bend, pose)
+        in_link_3 = _triangle_frame(p, elbow)
+
+        # Vectors of link 3 in frame 0 and back: their coordinates in the triangle's directions stay.
+        x_3, y_3, z_3 = (
+            _carried(turned_about_x(axis, p["alpha3"], -1.0), in_link_3, line)
+            for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        )
+        x_7, y_7, z_7 = (
+            turned_about_x(
+                turned_about_z(_carried(axis, line, in_link_3), elbow.theta_4, -1.0),
+                p["alpha4"],
+                -1.0,
+            )
+            for axis in T.rotation
+        )
+        arms.append(BentArm(elbow, (x_3, y_3, z_3), (x_7, y_7, z_7)))
+    return arms
 
 
 def _line_frame(W: Vector, pose: PoseSymbols) -> tuple[Vector, Vector, Vector]:

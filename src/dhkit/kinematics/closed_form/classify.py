@@ -18,7 +18,13 @@ from dhkit.kinematics.closed_form import (
     three_parallel,
     turret,
 )
-from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Family, Fit
+from dhkit.kinematics.closed_form.family import (
+    ALL_COORDINATES,
+    ARM_ANGLE,
+    LAST_JOINT,
+    Family,
+    Fit,
+)
 
 FAMILIES = (
     Family("elbow_wrist", spherical_wrist.elbow_fit, spherical_wrist.elbow_formulas),
@@ -36,12 +42,12 @@ FAMILIES = (
 )
 """Families of closed forms, in the order in which they are tried."""
 REDUNDANT = (
-    Family("arm_angle", arm_angle.arm_angle_fit, arm_angle.arm_angle_formulas, "arm angle"),
+    Family("arm_angle", arm_angle.arm_angle_fit, arm_angle.arm_angle_formulas, ARM_ANGLE),
     Family(
         "spherical_shoulder",
         spherical_shoulder.spherical_shoulder_fit,
         spherical_shoulder.spherical_shoulder_formulas,
-        "joint 7",
+        LAST_JOINT,
     ),
 )
 """Families of arms of seven joints with a closed form at a given value, in the order in which they are tried."""

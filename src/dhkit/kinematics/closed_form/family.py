@@ -21,6 +21,9 @@ ALL_COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 """The coordinates of a pose: position, and rotation about the axes."""
 OUTPUT_TYPES = ("float64", "float64", "uint8", "uint8", "uint8")
 """Types of joint positions, distance, valid, flags and status."""
+LAST_JOINT = "joint 7"
+ARM_ANGLE = "arm angle"
+"""Redundancies of seven joints."""
 Vector: TypeAlias = tuple[SX, SX, SX]
 Parameter: TypeAlias = "Array | float | np.floating[Any] | tuple[float, ...]"
 
@@ -93,7 +96,7 @@ class Family:
     formulas: Callable[[Mapping[str, SX], PoseSymbols], list[Branch]]
     """Returns the branches in the order of ``Fit.branches``, from named parameters and the pose."""
     redundancy: str = ""
-    """What is given besides the pose, for seven joints: ``joint 7`` or ``arm angle``; it is ``PoseSymbols.free``."""
+    """What is given besides the pose, for seven joints: ``LAST_JOINT`` or ``ARM_ANGLE``; it is ``PoseSymbols.free``."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ class PipelineStep:
         Number of items.
     each
         Where each item's inputs come from, by the input's name: an output of an earlier step with as many items, or
-        ``INDEX``. An input that has its source's name need not be here.
+        ``INDEX``; or all items' inputs, one entry after the other, as one output of a step of one item. An input that
+        has its source's name need not be here.
     shared
         Sources of inputs that all items share, likewise: an input of the pipeline, or all items of an output, one entry
         after the other.
@@ -96,8 +97,11 @@ class Pipeline:
                 if source == INDEX:
                     continue
                 items, size = sizes[source]
-                fits = variable.size == items * size if is_shared else items == step.items
-                if not fits or (not is_shared and variable.size != size):
+                if is_shared:
+                    fits = variable.size == items * size
+                else:
+                    fits = items in (1, step.items) and step.items * variable.size == items * size
+                if not fits:
                     raise ValueError(
                         f"{step.graph.name}: {variable.name} has {variable.size} entries, "
                         f"but {source} has {items} times {size}"

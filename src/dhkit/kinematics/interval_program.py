@@ -1,0 +1,274 @@
+"""The parts of a turn of the arm angle in which an arm of seven joints is inside its limits, as one program.
+
+The rotations of the shoulder and of the wrist are a fixed rotation before and after a turn by the arm angle psi about
+the line from the shoulder to the wrist, so that all their entries are a + b cos(psi) + c sin(psi). So are
+
+    cos(theta_1) sin(theta_2),  sin(theta_1) sin(theta_2),  cos(theta_2),
+    cos(theta_3) sin(theta_2),  sin(theta_3) sin(theta_2),
+
+and the same of theta_5, theta_6 and theta_7. A joint at its limit makes one of them, or a combination of two, a known
+number (Shimizu et al. 2008, see :mod:`dhkit.kinematics.closed_form.arm_angle`): its roots divide the turn into parts,
+and what is true in the middle of a part is true in all of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+from dhkit.kinematics.closed_form.arm_angle import BentArm, bent_arms
+from dhkit.kinematics.closed_form.family import Fit, PoseSymbols, Vector
+from dhkit.kinematics.closed_form.formulas import SINGULAR, Pair, angle, hypot
+from dhkit.kinematics.closed_form.program import is_pose
+from dhkit.kinematics.turn_parts import (
+    ALIGNED,
+    BEYOND,
+    JOINTS,
+    KNOWN,
+    NO_POSE,
+    PARTS,
+    RESULTS,
+    TOUCHING,
+)
+from dhkit.symbolic import Graph, Pipeline, PipelineStep
+from dhkit.symbolic.programs.graph import Variable
+
+_SX: TypeAlias = Any
+"""A CasADi SX scalar or matrix."""
+_Wave: TypeAlias = tuple[_SX, _SX, _SX]
+"""The numbers of a + b cos(psi) + c sin(psi)."""
+
+_EQUATIONS = PARTS // 2
+_TRIPLES = ((0, 1, 2), (4, 5, 6))
+"""Joints of the shoulder and of the wrist, counted from 0."""
+_WAVES = 5
+"""Number of waves of a triple of joints."""
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """Symbols of the limits."""
+
+    begin: Sequence[_SX]
+    width: Sequence[_SX]
+    """Lower limits and ranges of the joints' angles, turns."""
+    ends: tuple[Sequence[Pair], Sequence[Pair]]
+    """Lower and upper limits of the joints' angles, as pairs."""
+
+    @classmethod
+    def read(cls, numbers: _SX) -> _Limits:
+        """Return the limits from the last parameters."""
+        begin, width, *pairs = (ca.vertsplit(part) for part in ca.vertsplit(numbers, JOINTS))
+        cosines, sines = pairs[:2], pairs[2:]
+        lower, upper = (list(zip(c, s, strict=True)) for c, s in zip(cosines, sines, strict=True))
+        return cls(begin, width, (lower, upper))
+
+    def inside(self, joint: int, turns: _SX) -> _SX:
+        """Return whether an angle, in turns, is inside the limits of a joint."""
+        beyond = turns - self.begin[joint]
+        return beyond - ca.floor(beyond) <= self.width[joint]
+
+
+def interval_program(fit: Fit) -> Pipeline:
+    """Return the program of an arm with an arm angle: the tool's pose to ``RESULTS``.
+
+    Parameters
+    ----------
+    fit
+        The arm as a member of its family.
+    """
+    count = len(fit.vector())
+    parameters = ca.SX.sym("parameters", count + 6 * JOINTS)
+    limits = _Limits.read(parameters[count:])
+    steps = (
+        _equations(parameters, fit, limits),
+        _roots(parameters),
+        _parts(parameters, limits),
+    )
+    inputs = (Variable("parameters", (parameters.numel(),)), Variable("T", (4, 4)))
+    return Pipeline("arm_angle_parts", inputs, steps, RESULTS)
+
+
+def _equations(parameters: _SX, fit: Fit, limits: _Limits) -> PipelineStep:
+    """Return the step that finds the waves, and the equations of joints at their limits."""
+    T = ca.SX.sym("T", 4, 4)
+    p = fit.named(parameters[: len(fit.vector())])
+    pose = PoseSymbols(T=T[:3, :], scale=p["reach"] + ca.norm_1(T[:3, 3]))
+    arms = bent_arms(p, pose)
+    twists = [(p["alpha1"][1], p["alpha2"][1]), (p["alpha5"][1], p["alpha6"][1])]
+
+    # Waves at cos(psi) = sin(psi) = 0, which is no angle, are a; at 1 and 0 they are a + b, at 0 and 1 they are a + c.
+    a, a_and_b, a_and_c = (
+        _wave_values(bent_arms(p, replace(pose, free=free)), twists)
+        for free in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+    )
+    waves = [(x, y - x, z - x) for x, y, z in zip(a, a_and_b, a_and_c, strict=True)]
+    of_triples = [waves[k : k + _WAVES] for k in range(0, len(waves), _WAVES)]
+    equations = [
+        equation
+        for k, of_triple in enumerate(of_triples)
+        for equation in _at_limits(of_triple, limits, _TRIPLES[k % 2])
+    ]
+    # Equations without roots fill up the vectors.
+    equations += [(1.0, 0.0, 0.0)] * (_EQUATIONS - len(equations))
+    columns = [ca.vertcat(*column) for column in zip(*equations, strict=True)]
+
+    is_aligned = ca.logic_or(*(_is_aligned(of_triples[k::2]) for k in range(2)))
+    state = ca.if_else(is_aligned, float(ALIGNED), float(KNOWN))
+    state = ca.if_else(arms[0].elbow.miss == 0, state, float(BEYOND))
+    state = ca.if_else(is_pose(T), state, float(NO_POSE))
+    elbows = [limits.inside(3, angle(arm.elbow.theta_4) / math.tau) for arm in arms]
+    outputs = {
+        # Each equation is there for either of its roots.
+        "equation": ca.vertcat(*(ca.vertcat(column, column) for column in columns)),
+        "waves": ca.vertcat(*(ca.vertcat(*wave) for wave in waves)),
+        "elbows": ca.vertcat(*(ca.if_else(is_inside, 1.0, 0.0) for is_inside in elbows)),
+        "state": state,
+    }
+    return PipelineStep(Graph.of("equations", {"parameters": parameters, "T": T}, outputs))
+
+
+def _wave_values(arms: Sequence[BentArm], twists: Sequence[tuple[_SX, _SX]]) -> list[_SX]:
+    """Return the values of all waves: joint 4 bent to either side, the shoulder and the wrist, five of each."""
+    return [
+        value
+        for arm in arms
+        for axes, sines in zip((arm.shoulder, arm.wrist), twists, strict=True)
+        for value in _of_triple(axes, sines)
+    ]
+
+
+def _of_triple(axes: tuple[Vector, Vector, Vector], twists: tuple[_SX, _SX]) -> tuple[_SX, ...]:
+    """Return cos and sin(theta_1) sin(theta_2), cos(theta_2), cos and sin(theta_3) sin(theta_2) of three joints.
+
+    The rotation Rz(theta_1) Rx(alpha_1) Rz(theta_2) Rx(alpha_2) Rz(theta_3) has, with twists of +-90 degrees, the third
+    column and the third row
+
+        (cos(theta_1) sin(theta_2) sin(alpha_2), sin(theta_1) sin(theta_2) sin(alpha_2),
+         -cos(theta_2) sin(alpha_1) sin(alpha_2)),
+        (cos(theta_3) sin(theta_2) sin(alpha_1), -sin(theta_3) sin(theta_2) sin(alpha_1), the same).
+
+    Parameters
+    ----------
+    axes
+        The rotation's columns.
+    twists
+        sin(alpha_1) and sin(alpha_2).
+    """
+    x, y, z = axes
+    sin_1, sin_2 = twists
+    return z[0] * sin_2, z[1] * sin_2, -z[2] * sin_1 * sin_2, x[2] * sin_1, -y[2] * sin_1
+
+
+def _at_limits(waves: Sequence[_Wave], limits: _Limits, joints: Sequence[int]) -> list[_Wave]:
+    """Return the waves that are zero where a joint of a triple is at a limit, or where the outer ones may jump."""
+    first_along, first_across, polar, last_along, last_across = waves
+    first, middle, last = joints
+    equations = []
+    for ends in limits.ends:
+        # sin(theta - end) sin(theta_2) of the outer joints, cos(theta_2) - cos(end) of the one between them.
+        for along, across, joint in (
+            (first_along, first_across, first),
+            (last_along, last_across, last),
+        ):
+            cosine, sine = ends[joint]
+            equations.append(
+                tuple(y * cosine - x * sine for x, y in zip(along, across, strict=True))
+            )
+        a, b, c = polar
+        equations.append((a - ends[middle][0], b, c))
+    # The outer joints may jump where the one between them lines them up, at an extreme of cos(theta_2).
+    _, b, c = polar
+    equations.append((0.0, c, -b))
+    return equations
+
+
+def _is_aligned(of_bends: Sequence[Sequence[_Wave]]) -> _SX:
+    """Return whether the outer joints of a triple turn about one line at every arm angle."""
+    entries = [ca.fabs(x) for waves in of_bends for wave in waves[:2] for x in wave]
+    return reduce(ca.fmax, entries) < SINGULAR
+
+
+def _roots(parameters: _SX) -> PipelineStep:
+    """Return the step that solves a + b cos(psi) + c sin(psi) = 0: item k has a root of equation k modulo 32, or pi.
+
+    With the length r of (b, c) and its direction phi, cos(psi - phi) = -a / r.
+    """
+    equation = ca.SX.sym("equation", 3)
+    index = ca.SX.sym("index")
+    a, b, c = ca.vertsplit(equation)
+    r = hypot(b, c)
+    cosine = -a / ca.if_else(r > 0, r, 1.0)
+    square = 1.0 - cosine * cosine
+    is_touching = ca.fabs(square) < 2 * TOUCHING
+    is_root = ca.logic_and(r > 0, ca.logic_or(is_touching, square > 0))
+    sine = ca.sqrt(ca.if_else(is_touching, 0.0, ca.fmax(square, 0.0)))
+    sine = ca.if_else(index < float(_EQUATIONS), sine, -sine)
+    psi = ca.atan2(c * cosine + b * sine, b * cosine - c * sine)
+    psi = ca.if_else(is_root, psi, math.pi)
+    # The turn begins at the last number of the first half, which has no equation.
+    psi = ca.if_else(index == _EQUATIONS - 1.0, -math.pi, psi)
+    inputs = {"parameters": parameters, "equation": equation, "index": index}
+    return PipelineStep(Graph.of("roots", inputs, {"root": psi}), PARTS, each={"index": "index"})
+
+
+def _parts(parameters: _SX, limits: _Limits) -> PipelineStep:
+    """Return the step that tells of the part from each root to the next one whether the arm is inside its limits."""
+    index = ca.SX.sym("index")
+    own = ca.SX.sym("root")
+    roots = ca.SX.sym("roots", PARTS)
+    waves = ca.SX.sym("waves", 4 * _WAVES * 3)
+    elbows = ca.SX.sym("elbows", 2)
+
+    place = ca.SX(0.0)
+    following = ca.SX(math.pi)
+    for k, other in enumerate(ca.vertsplit(roots)):
+        # Equal ones stay in their order.
+        is_before = ca.logic_or(other < own, ca.logic_and(other == own, float(k) < index))
+        place = place + ca.if_else(is_before, 1.0, 0.0)
+        following = ca.if_else(other > own, ca.fmin(other, following), following)
+
+    middle = (own + following) / 2.0
+    c, s = ca.cos(middle), ca.sin(middle)
+    values = [a + b * c + d * s for a, b, d in map(ca.vertsplit, ca.vertsplit(waves, 3))]
+    of_triples = [
+        _is_inside(values[k * _WAVES : (k + 1) * _WAVES], limits, _TRIPLES[k % 2]) for k in range(4)
+    ]
+    of_bends = [
+        ca.logic_and(elbows[k] != 0, ca.logic_and(*of_triples[2 * k : 2 * k + 2])) for k in range(2)
+    ]
+    is_inside = ca.if_else(ca.logic_or(*of_bends), 1.0, 0.0)
+    inputs = {
+        "parameters": parameters,
+        "index": index,
+        "root": own,
+        "roots": roots,
+        "waves": waves,
+        "elbows": elbows,
+    }
+    return PipelineStep(
+        Graph.of("parts", inputs, {"sorted_part": ca.vertcat(own, is_inside), "place": place}),
+        PARTS,
+        each={"index": "index"},
+        shared={"roots": "root", "waves": "waves", "elbows": "elbows"},
+        places="place",
+    )
+
+
+def _is_inside(values: Sequence[_SX], limits: _Limits, joints: Sequence[int]) -> _SX:
+    """Return whether three joints are inside their limits for sin(theta_2) of either sign."""
+    first_along, first_across, polar, last_along, last_across = values
+    first = ca.atan2(first_across, first_along) / math.tau
+    middle = ca.atan2(hypot(first_along, first_across), polar) / math.tau
+    last = ca.atan2(last_across, last_along) / math.tau
+    # With the other sign, the outer joints turn by half a turn.
+    solutions = ((first, middle, last), (first + 0.5, -middle, last + 0.5))
+    are_inside = [
+        reduce(ca.logic_and, map(limits.inside, joints, solution)) for solution in solutions
+    ]
+    return ca.logic_or(*are_inside)
