@@ -825,12 +825,13 @@ class Arm:
             is chosen that allows a solution inside the limits.
         prefer
             What that value is chosen for: ``"limits"``, distance from the limits; ``"manipulability"``; or joint values
-            (7,) to be near to.
+            (7,) to be near to. The best of 33 values is refined to a 64th of their steps.
 
         Returns
         -------
         IKSolutions
-            B branches in a fixed order: ``q`` (..., B, n), ``valid`` (..., B), and a status for each pose. A pose that
+            ``q`` (..., B, n), ``valid`` (..., B), and a status for each pose. In closed form the branches are the same
+            for every pose; of other arms of six joints B is the largest number of solutions in the batch. A pose that
             is out of reach is a status, not an exception.
 
         Raises
@@ -949,7 +950,9 @@ class Arm:
         Returns
         -------
         list[tuple[float, float]]
-            Beginning and end of each interval, rad, in ascending order.
+            Beginning and end of each interval, rad, in ascending order; of an arm angle in [-pi, pi], where one that
+            goes through pi is in two parts. Those of an arm angle are roots of equations. Joint 7 is tried at steps of
+            half a degree: a narrower interval may be missing.
 
         Raises
         ------
@@ -969,7 +972,12 @@ class Arm:
         return redundancy_intervals(self._description, T, limits=limits)
 
     def ik_chunks(
-        self, T: ArrayLike, size: int = 16_384, seed: ArrayLike | None = None, threads: int = 1
+        self,
+        T: ArrayLike,
+        size: int = 16_384,
+        seed: ArrayLike | None = None,
+        threads: int = 1,
+        redundancy: ArrayLike | None = None,
     ) -> Iterator[tuple[slice, IKSolutions]]:
         """Yield slices of many poses, and their solutions, in memory that is used again.
 
@@ -981,8 +989,8 @@ class Arm:
             Poses of the tool in the world, shape (N, 4, 4), m.
         size
             Number of poses in a chunk.
-        seed, threads
-            As for :meth:`ik`.
+        seed, threads, redundancy
+            As for :meth:`ik`, whose closed form the arm must have.
 
         Returns
         -------
@@ -1004,7 +1012,7 @@ class Arm:
         """
         from dhkit.kinematics import inverse_kinematics_in_chunks
 
-        return inverse_kinematics_in_chunks(self._description, T, size, seed, threads)
+        return inverse_kinematics_in_chunks(self._description, T, size, seed, threads, redundancy)
 
     def ik_numeric(
         self,
@@ -1091,8 +1099,18 @@ class Arm:
             progress=progress,
         )
 
-    def ik_path(self, T: ArrayLike, q0: ArrayLike, *, limits: bool = True) -> IKPath:
+    def ik_path(
+        self,
+        T: ArrayLike,
+        q0: ArrayLike,
+        *,
+        limits: bool = True,
+        redundancy: ArrayLike | None = None,
+    ) -> IKPath:
         """Follow one branch of the inverse kinematics along a path of poses.
+
+        An arm of seven joints keeps the redundancy of ``q0`` unless that leads nowhere; see
+        :func:`dhkit.kinematics.follow_path`.
 
         Parameters
         ----------
@@ -1103,6 +1121,8 @@ class Arm:
             Joint values near which the path starts, shape (n,), rad and m.
         limits
             Whether solutions outside the joint limits are left out.
+        redundancy
+            For an arm of seven joints the redundancy at the poses, shape () or (N,), rad, instead of that of ``q0``.
 
         Returns
         -------
@@ -1112,7 +1132,7 @@ class Arm:
         Raises
         ------
         ValueError
-            T has not shape (N, 4, 4), or q0 not (n,) or not finite.
+            T has not shape (N, 4, 4), or q0 not (n,) or not finite; ``redundancy`` does not fit.
         ModelError
             The arm has no closed form and fewer than six joints.
 
@@ -1127,7 +1147,7 @@ class Arm:
         """
         from dhkit.kinematics import follow_path
 
-        return follow_path(self._description, T, q0, limits=limits)
+        return follow_path(self._description, T, q0, limits=limits, redundancy=redundancy)
 
     @property
     def family(self) -> Classification:

@@ -221,7 +221,9 @@ def test_an_arm_of_seven_joints_is_solved_at_a_redundancy(facts, ik):
     status, out, _ = ik("panda", "--like", "ready", "--redundancy", "45", "--degrees")
     assert status == 0 and "at joint 7 = 45 °" in out
     status, out, _ = ik("panda", "--xyz", "3", "0", "0")
-    assert status == 1 and "no solution found: joint 7 = " in out
+    assert status == 1 and "out of reach: no joint values reach this pose" in out
+    status, out, _ = ik("panda", "--like", "ready", "--redundancy", "2.5")
+    assert status == 1 and "no solution found: joint 7 = 2.5 rad" in out
     status, _, err = ik("puma560", "--like", "nominal", "--redundancy", "0.5")
     assert status == 2 and "redundancy is given, but puma560 has 6 joints" in err
 

@@ -6,6 +6,7 @@ import pytest
 import acceptance
 from arms_without_closed_form import GEN3, SEVEN
 from dhkit import Arm
+from dhkit.errors import UnreachableError
 from dhkit.kinematics import IKStatus
 from dhkit.kinematics.redundant import redundancy_of
 from dhkit.kinematics.solver import solver_for
@@ -283,3 +284,67 @@ def test_intervals_of_an_arm_stretched_along_its_first_axis(quarters):
             lower=q - rng.uniform(0.1, 3.0, 7), upper=q + rng.uniform(0.1, 3.0, 7)
         )
         assert angles_on_the_wrong_side(arm, arm.fk(q)) == 0
+
+
+def test_the_posture_to_be_near_to_is_found_where_the_pose_is_its_own():
+    arm = SEVEN["Franka Panda"]
+    numbers = arm.description.numbers
+    for q in np.random.default_rng(11).uniform(numbers.lower, numbers.upper, (10, 7)):
+        found = arm.ik(arm.fk(q), prefer=q)
+        assert np.abs(found.nearest(q, limits=True) - q).max() < 1e-9
+
+
+def test_a_refined_preference_is_near_the_best_of_many_values():
+    arm = SEVEN["Franka Panda"]
+    numbers = arm.description.numbers
+    posture = arm.configurations["ready"]
+    values = np.linspace(numbers.lower[6], numbers.upper[6], 5001)
+    gaps = []
+    for q in np.random.default_rng(12).uniform(numbers.lower, numbers.upper, (10, 7)):
+        T = arm.fk(q)
+        every = arm.ik(np.broadcast_to(T, (len(values), 4, 4)), redundancy=values)
+        near = arm.ik(T, prefer=posture).nearest(posture, limits=True)
+        best = np.nanmin(np.sum((every.within_limits(posture) - posture) ** 2, axis=-1))
+        gaps.append(np.sum((near - posture) ** 2) - best)
+    assert np.median(gaps) < 1e-3
+
+
+def test_a_pose_that_one_redundancy_misses_is_not_said_out_of_reach():
+    arm = SEVEN["Franka Panda"]
+    T = arm.fk("ready")
+    found = arm.ik(T, redundancy=2.5)
+    assert str(found.status) == "not_found" and not found.reached
+    assert "not_found, 0 reached" in repr(found)
+    with pytest.raises(UnreachableError, match=r"at the redundancy 2.5 rad.*redundancy_intervals"):
+        found.require()
+    T[:3, 3] *= 20
+    for far in (arm.ik(T), arm.ik(T, redundancy=0.1)):
+        assert str(far.status) == "out_of_reach" and "by" not in repr(far)
+
+
+@pytest.mark.parametrize("name", [*SEVEN, "Kinova Gen3"])
+def test_a_path_keeps_its_redundancy_or_has_the_one_that_is_given(name):
+    arm = SEVEN.get(name, GEN3)
+    q0 = np.array([0.1, 0.5, -0.3, 1.2, 0.4, -0.8, 0.6])
+    T = np.repeat(arm.fk(q0)[None], 40, axis=0)
+    T[:, 0, 3] += 0.05 * np.sin(np.linspace(0, 2 * np.pi, 40))
+    path = arm.ik_path(T, q0, limits=False)
+    assert path.ok and np.abs(path.q[-1] - path.q[0]).max() < 1e-9
+    assert np.ptp(arm.redundancy(path.q)) < 1e-9
+
+    given = arm.redundancy(q0) + np.linspace(0, 0.2, 40)
+    path = arm.ik_path(T, q0, limits=False, redundancy=given)
+    assert path.ok and np.abs(arm.redundancy(path.q) - given).max() < 1e-9
+    assert np.abs(arm.fk(path.q) - T).max() < 1e-11
+    puma = Arm.load("puma560")
+    with pytest.raises(ValueError, match="redundancy is given, but puma560 has 6 joints"):
+        puma.ik_path(puma.fk(np.zeros((2, 6))), np.zeros(6), redundancy=0.1)
+
+
+def test_chunks_of_seven_joints_are_those_of_one_call():
+    arm = SEVEN["Franka Panda"]
+    q = np.random.default_rng(13).uniform(-1, 1, (50, 7))
+    T = arm.fk(q)
+    every = arm.ik(T, redundancy=q[:, 6])
+    for rows, found in arm.ik_chunks(T, size=16, redundancy=q[:, 6]):
+        assert np.array_equal(found.q, every.q[rows], equal_nan=True)

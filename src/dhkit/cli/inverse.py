@@ -124,7 +124,7 @@ class ReachedPose:
             return f"no solution found: {self.given}"
         if not is_proved:
             return f"no solution found by {self.method}, which does not prove that there is none"
-        if np.isfinite(distance):
+        if np.isfinite(distance) and self.solutions.redundancy is None:
             return f"out of reach by {distance:.4g} m"
         return "out of reach: no joint values reach this pose"
 

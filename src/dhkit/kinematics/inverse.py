@@ -66,7 +66,8 @@ def inverse_kinematics(
     Returns
     -------
     IKSolutions
-        B branches in a fixed order. The status tells poses that are out of reach, or that are not a pose.
+        B branches: of a closed form the same for every pose, in a fixed order. The status tells poses that are out of
+        reach, or that are not a pose.
 
     Raises
     ------
@@ -157,6 +158,7 @@ def inverse_kinematics_in_chunks(
     size: int = _CHUNK,
     seed: ArrayLike | None = None,
     threads: int = 1,
+    redundancy: ArrayLike | None = None,
 ) -> Iterator[tuple[slice, IKSolutions]]:
     """Return an iterator over the solutions of many poses, ``size`` at a time, without memory for all of them.
 
@@ -166,13 +168,15 @@ def inverse_kinematics_in_chunks(
     Parameters
     ----------
     description
-        The robot; one whose inverse kinematics have a closed form of ours.
+        The robot; one whose inverse kinematics have a closed form, of seven joints at a given redundancy.
     T
         Poses of the tool in the world, shape (N, 4, 4).
     size
         Number of poses per chunk.
     seed, threads
         As for :func:`inverse_kinematics`; ``seed`` of shape (n,) or (N, n).
+    redundancy
+        As for :func:`inverse_kinematics`, shape () or (N,), rad.
 
     Returns
     -------
@@ -202,18 +206,23 @@ def inverse_kinematics_in_chunks(
         raise ValueError(
             f"seed has shape {starts.shape}; expected {(description.n,)} or {(len(poses), description.n)}"
         )
-    solver = solver_of(description)
-    if solver is None:
+    found = classify(description)
+    fit = found.fit if found.redundant is None else found.redundant[1]
+    if fit is None:
         raise ModelError(
-            f"{description.name} is {classify(description).words}; expected an arm with a closed form"
+            f"{description.name} is {found.words}: how many branches there will be is open; use arm.ik"
         )
-    q = np.empty((min(size, len(poses)), len(solver.fit.branches), description.n))
+    q = np.empty((min(size, len(poses)), len(fit.branches), description.n))
+    values = None if redundancy is None else np.asarray(redundancy)
+    if values is not None and values.shape not in ((), (len(poses),)):
+        raise ValueError(f"redundancy has shape {values.shape}; expected () or ({len(poses)},)")
 
     def solve(begin: int) -> tuple[slice, IKSolutions]:
         rows = slice(begin, min(begin + size, len(poses)))
         near = starts if starts is None or starts.ndim == 1 else starts[rows]
+        at = values if values is None or not values.ndim else values[rows]
         return rows, inverse_kinematics(
-            description, poses[rows], near, q[: rows.stop - rows.start], threads
+            description, poses[rows], near, q[: rows.stop - rows.start], threads, at
         )
 
     return map(solve, range(0, len(poses), size))

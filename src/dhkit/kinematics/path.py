@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.cached_property import cached_property
-from dhkit.description import Array, Description, joint_vector, takes_robot
+from dhkit.description import Array, Description, joint_vector, lock, takes_robot
 from dhkit.display import counted, html_block, html_table, repr_line
 from dhkit.errors import UnreachableError
 from dhkit.kernels import pose_rows
@@ -108,7 +108,12 @@ class IKPath:
 
 @takes_robot
 def follow_path(
-    description: Description, T: ArrayLike, q0: ArrayLike, *, limits: bool = True
+    description: Description,
+    T: ArrayLike,
+    q0: ArrayLike,
+    *,
+    limits: bool = True,
+    redundancy: ArrayLike | None = None,
 ) -> IKPath:
     """Follow one branch along a path of poses.
 
@@ -118,10 +123,10 @@ def follow_path(
     Parameters
     ----------
     description
-        The robot. One of seven joints with a closed form at a given redundancy keeps that of ``q0``, so that a closed
-        path ends where it began. Where that leads nowhere, and for other arms of six joints or more without a closed
-        form, each pose is reached by iteration from the one before; a redundant arm then moves by the shortest joint
-        steps, and a closed path need not close.
+        The robot. One of seven joints keeps the redundancy of ``q0``, so that a closed path ends where it began. Where
+        that leads nowhere, and for other arms of six joints or more without a closed form, each pose is reached by
+        iteration from the one before; a redundant arm then moves by the shortest joint steps, and a closed path need
+        not close.
     T
         Poses of the tool in the world, shape (N, 4, 4), near enough to each other for joints to move less than 45
         degrees (or an eighth of the reach) between them.
@@ -129,6 +134,9 @@ def follow_path(
         Joint values, shape (n,), rad and m, near which the path starts.
     limits
         Whether solutions outside the joint limits are left out.
+    redundancy
+        For an arm of seven joints the redundancy at the poses, shape () or (N,), rad, instead of that of ``q0``. Poses
+        that have no solution there are lost.
 
     Returns
     -------
@@ -138,7 +146,8 @@ def follow_path(
     Raises
     ------
     ValueError
-        T has not shape (N, 4, 4), or q0 not (n,) or not finite.
+        T has not shape (N, 4, 4), or q0 not (n,) or not finite; ``redundancy`` does not fit, or the arm has not seven
+        joints.
     ModelError
         The arm has no closed form and fewer than six joints.
 
@@ -155,8 +164,12 @@ def follow_path(
     if poses.ndim != 3:
         raise ValueError(f"T has shape {poses.shape}; expected (N, 4, 4)")
     q0 = joint_vector(description, q0, "q0")
-    if classify(description).redundant is not None:
-        kept = _followed_by_branches(description, poses, q0, limits)
+    if redundancy is not None:
+        return _followed_by_branches(description, poses, q0, limits, redundancy)
+    if description.kinds == "RRRRRRR":
+        has_closed_form = classify(description).redundant is not None
+        keep = _followed_by_branches if has_closed_form else _followed_at_joint_7
+        kept = keep(description, poses, q0, limits)
         if kept.ok:
             return kept
         searched = _followed_by_iteration(description, poses, q0, limits)
@@ -167,10 +180,15 @@ def follow_path(
 
 
 def _followed_by_branches(
-    description: Description, poses: Array, q0: Array, limits: bool
+    description: Description,
+    poses: Array,
+    q0: Array,
+    limits: bool,
+    redundancy: ArrayLike | None = None,
 ) -> IKPath:
     """Return the path by the solutions of each pose, of which the one nearest to the last is taken."""
-    solutions = inverse_kinematics(description, poses, seed=q0)
+    seed = q0 if redundancy is None else None
+    solutions = inverse_kinematics(description, poses, seed, redundancy=redundancy)
     usable = solutions.allowed if limits else solutions.valid
     at_singularity = solutions.flags & (IKFlag.wrist | IKFlag.shoulder) != 0
     has_free_joint = np.asarray(at_singularity.any(axis=-1))
@@ -187,7 +205,7 @@ def _followed_by_branches(
     branch = [""] * len(poses)
     at = q0
     for k in range(len(poses)):
-        if has_free_joint[k]:
+        if has_free_joint[k] and redundancy is None:
             # Where the wrist is straight, or its centre on axis 1, one joint is free and keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
             allowed = here.allowed if limits else here.valid
@@ -199,6 +217,17 @@ def _followed_by_branches(
             q[k] = at
             branch[k] = solutions.branches[place]
     return _path_of(description, q, branch, q0, motion)
+
+
+def _followed_at_joint_7(description: Description, poses: Array, q0: Array, limits: bool) -> IKPath:
+    """Return the path of an arm of seven joints with joint 7 at rest, by iteration of the six others."""
+    last = description.n - 1
+    # Iteration keeps within limits, which here are one value; q0 may be outside those of joint 7.
+    numbers = description.numbers
+    at = float(np.clip(q0[last], numbers.lower[last], numbers.upper[last]) if limits else q0[last])
+    path = _followed_by_iteration(lock(description, {last: at}), poses, q0[:last], limits)
+    q = np.column_stack([path.q, np.where(np.isnan(path.q[:, 0]), np.nan, at)])
+    return _path_of(description, q, path.branch, q0, "whole")
 
 
 def _path_of(

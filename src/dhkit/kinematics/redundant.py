@@ -28,7 +28,7 @@ from dhkit.description.poses import inverse_pose, turned_about
 from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, Kernel
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import collect
+from dhkit.kinematics.candidates import collect, is_beyond_all_links
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import LAST_JOINT
@@ -49,6 +49,9 @@ _TRIED_AT_ONCE = 32
 """Number of values that are tried together in a closed form; by elimination they are tried one by one."""
 _RESTARTS = 31
 """Number of restarts of the search for a solution between the tried values; where there is one, few are needed."""
+_AROUND = np.linspace(-1.0, 1.0, 9)
+_REFINEMENTS = 3
+"""Values around the best one, in steps between them, and how often the steps become a quarter."""
 _PREFERRED_TOGETHER = 256
 """Poses whose solutions at all tried values are held together, some 4 MB."""
 
@@ -79,7 +82,8 @@ def solve_redundant(
     threads
         Number of threads for a large batch of a closed form.
     prefer
-        How a value is chosen among those that are tried, for the best solution inside the limits: ``"limits"``, the
+        How a value is chosen, for the best solution inside the limits at the 33 values and then, 64 times as fine,
+        around the best of them: ``"limits"``, the
         farthest from the limits; ``"manipulability"``, that of :func:`dhkit.kinematics.manipulability` for whole
         motions; or joint positions (7,), rad, the nearest to them.
     out
@@ -191,13 +195,13 @@ class AtRedundancy:
             return self._by_elimination(self.method, T, values)
         free = np.stack([np.zeros(values.shape), values])
         found = solve_in_closed_form(self.description, self.method, T, free, out, threads)
-        # Another value may have a solution.
-        status = np.where(
-            found.status_code == IKStatus.out_of_reach, IKStatus.not_found, found.status_code
-        )
-        return replace(
-            found, status_code=status.astype(np.uint8), complete=False, redundancy=values
-        )
+        status = found.status_code
+        is_missed = status == IKStatus.out_of_reach
+        if is_missed.any():
+            # Another value may have a solution, unless all links in one line are too short.
+            is_beyond = is_beyond_all_links(self.description, T[..., :3, 3])
+            status[is_missed & ~is_beyond] = IKStatus.not_found
+        return replace(found, complete=False, redundancy=values)
 
     def _by_elimination(self, six: Description, T: Array, values: Array) -> IKSolutions:
         """Return the solutions of the arm without joint 7, for the poses before joint 7 moves the tool."""
@@ -333,31 +337,54 @@ def _score_of(description: Description, prefer: Preference) -> _Score:
 
 
 def _preferred_values(solver: AtRedundancy, T: Array, score: _Score, threads: int) -> Array:
-    """Return each pose's tried value of the best score, shape (...); where none is allowed, one with solutions."""
+    """Return each pose's value of the best score, shape (...); where no solution is allowed, one with solutions.
+
+    Tried are the 33 values and that of the posture to be near to, and then values between the best one's neighbours.
+    """
     batch = T.shape[:-2]
     poses = T.reshape(-1, 4, 4)
-    tried = values_to_try(solver.description)
+    description = solver.description
+    tried = values_to_try(description)
+    if score.near is not None:
+        tried = np.append(tried, redundancy_of(description, score.near))
+    lower, upper = redundancy_range(description)
     chosen = np.full(len(poses), np.nan)
     for begin in range(0, len(poses), _PREFERRED_TOGETHER):
         some = slice(begin, begin + _PREFERRED_TOGETHER)
         here = poses[some]
-        shape = (len(tried), len(here))
-        found = solver(
-            np.broadcast_to(here, (*shape, 4, 4)), np.broadcast_to(tried[:, None], shape), threads
-        )
-        q = found.within_limits(score.near)
-        is_allowed = found.allowed
-        scores = np.full(is_allowed.shape, -np.inf)
-        scores[is_allowed] = score.of(q[is_allowed])
-        of_value = scores.max(axis=-1)
-        has_one = is_allowed.any(axis=(0, 2))
-        chosen[some] = np.where(has_one, tried[of_value.argmax(axis=0)], np.nan)
+        values = np.broadcast_to(tried[:, None], (len(tried), len(here)))
+        best, value = _best_values(solver, here, values, score, threads)
+        step = (upper - lower) / _TRIED
+        for _ in range(_REFINEMENTS):
+            around = np.clip(value + step * _AROUND[:, None], lower, upper)
+            # Where nothing is allowed, nothing is refined.
+            around = np.where(np.isfinite(best), around, value)
+            found, at = _best_values(solver, here, around, score, threads)
+            value = np.where(found > best, at, value)
+            best = np.maximum(best, found)
+            step /= _AROUND.size // 2
+        chosen[some] = np.where(np.isfinite(best), value, np.nan)
     open_rows = np.flatnonzero(np.isnan(chosen))
     if len(open_rows):
         chosen[open_rows] = np.asarray(
             _at_tried_values(solver, poses[open_rows], threads).redundancy
         )
     return chosen.reshape(batch)
+
+
+def _best_values(
+    solver: AtRedundancy, poses: Array, values: Array, score: _Score, threads: int
+) -> tuple[Array, Array]:
+    """Return the best scores of poses (N, 4, 4) at values (V, N), -inf if none is allowed, and their values, (N,)."""
+    found = solver(np.broadcast_to(poses, (*values.shape, 4, 4)), np.array(values), threads)
+    q = found.within_limits(score.near)
+    is_allowed = found.allowed
+    scores = np.full(is_allowed.shape, -np.inf)
+    scores[is_allowed] = score.of(q[is_allowed])
+    of_value = scores.max(axis=-1)
+    place = of_value.argmax(axis=0)
+    columns = np.arange(len(poses))
+    return of_value[place, columns], values[place, columns]
 
 
 def check_seven(description: Description) -> None:

@@ -61,7 +61,10 @@ class IKFlag(IntFlag):
 
 @dataclass(frozen=True, eq=False)
 class IKSolutions:
-    """All solutions of a batch of poses; B branches in a fixed order, the same for every pose.
+    """All solutions of a batch of poses, in B branches.
+
+    In closed form the branches are the same for every pose, in a fixed order. By elimination they are the solutions in
+    ascending order of their joint values, and B is the largest number of them at a pose of the batch.
 
     Rows of branches that do not reach the pose are NaN. Angles are in (-pi, pi].
     """
@@ -76,8 +79,9 @@ class IKSolutions:
     """:class:`IKStatus` of each pose, shape (...)."""
     distance: Array
     """Distance, m, shape (...), from the point that decides the reach (the wrist's centre, or the tool) to the nearest
-    reachable one: exact for arms with a spherical wrist, an upper bound for others. 0 where the pose is reached, NaN
-    where it is not a pose. Joint limits do not count."""
+    reachable one: exact for arms with a spherical wrist, an upper bound for others, of seven joints at the redundancy
+    that was taken. 0 where the pose is reached, NaN where it is not a pose, or not reached by an elimination or an
+    iteration, which know no distance. Joint limits do not count."""
     branches: tuple[str, ...]
     """The branches' names, in words that :meth:`branch` understands."""
     met: tuple[str, ...]
@@ -185,6 +189,11 @@ class IKSolutions:
         return np.array([status.name for status in IKStatus])[self.status_code]
 
     @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Whether some branch reaches the pose, shape (...); the status is then ok or singular."""
+        return np.asarray(self.valid.any(axis=-1))
+
+    @property
     def allowed(self) -> NDArray[np.bool_]:
         """Whether the branch reaches the pose and is inside the limits, shape (..., B)."""
         inside: NDArray[np.bool_] = self.valid & (self.flags & IKFlag.out_of_limits == 0)
@@ -222,20 +231,21 @@ class IKSolutions:
             )
         return self.q[..., chosen[0], :]
 
-    def nearest(self, q: ArrayLike) -> Array:
+    def nearest(self, q: ArrayLike, *, limits: bool = False) -> Array:
         """Return for each pose the solution nearest to ``q``, in the winding nearest to it.
 
         Parameters
         ----------
         q
             Joint values, shape (n,) or (..., n), rad and m.
+        limits
+            Whether it must be inside the joint limits, in a winding that they allow.
 
         Returns
         -------
         Array
             Shape (..., n): the branch of least sum of squared joint differences, angles the short way round, whole
-            turns added so that it is near ``q``; limits do not count (see :meth:`within_limits`). NaN where no branch
-            reaches.
+            turns added so that it is near ``q``. NaN where no branch reaches; :meth:`require` raises instead.
 
         Raises
         ------
@@ -243,6 +253,8 @@ class IKSolutions:
             ``q`` does not fit.
         """
         near = self._near(q)
+        if limits:
+            return self._closest(self.within_limits(near), near, self.allowed)
         return self._closest(self.wound(self.q, near[..., None, :], limits=False), near, self.valid)
 
     def within_limits(self, near: ArrayLike | None = None) -> Array:
@@ -413,9 +425,15 @@ class IKSolutions:
     @property
     def _summary(self) -> str:
         """Outcome of one pose, in words."""
-        status = IKStatus(int(self.status_code)).name
-        missed = f" by {float(self.distance):.4g} m" if self.distance > 0 else ""
-        return f"{status}{missed}, {self.valid.sum()} reached, {self.allowed.sum()} inside the limits{self._doubt}"
+        status = IKStatus(int(self.status_code))
+        is_told = status is IKStatus.out_of_reach and self._knows_distance and self.distance > 0
+        missed = f" by {float(self.distance):.4g} m" if is_told else ""
+        return f"{status.name}{missed}, {self.valid.sum()} reached, {self.allowed.sum()} inside the limits{self._doubt}"
+
+    @property
+    def _knows_distance(self) -> bool:
+        """Whether ``distance`` is that from the whole workspace: not of one redundancy."""
+        return self.redundancy is None
 
     @property
     def _doubt(self) -> str:
@@ -470,10 +488,16 @@ class IKSolutions:
     def _reason(self, place: tuple[int, ...], count: int) -> str:
         index = place[0] if len(place) == 1 else place
         where = f"pose {index}" if place else "the pose"
-        others = f" (and {count - 1} more)" if count > 1 else ""
+        others = f" (one of {count} without a solution inside the limits)" if count > 1 else ""
         status = IKStatus(int(self.status_code[place]))
         if status is IKStatus.not_a_pose:
             return f"{where}{others} is not a pose: NaN, or a rotation that is not orthonormal"
+        if status is IKStatus.not_found and self.redundancy is not None:
+            value = float(self.redundancy[place])
+            return (
+                f"{where}{others}: no solution was found at the redundancy {value:.6g} rad, which does not prove that "
+                "there is none at another; arm.redundancy_intervals tells where there are some"
+            )
         if status is IKStatus.not_found:
             return (
                 f"{where}{others}: no solution was found, which does not prove that there is none"
@@ -481,7 +505,7 @@ class IKSolutions:
         if status is IKStatus.out_of_reach:
             distance = float(self.distance[place])
             return f"{where}{others} is out of reach" + (
-                f" by {distance:.4g} m" if distance > 0 else ""
+                f" by {distance:.4g} m" if self._knows_distance and distance > 0 else ""
             )
         return f"{where}{others} is reached only outside the joint limits"
 

@@ -295,6 +295,8 @@ def test_chunks_of_what_cannot_be_are_refused_at_once():
         inverse_kinematics_in_chunks(arm, np.eye(4))
     with pytest.raises(ValueError, match=r"seed has shape \(3, 6\); expected \(6,\) or \(10, 6\)"):
         inverse_kinematics_in_chunks(arm, T, 4, np.zeros((3, 6)))
-    with pytest.raises(ModelError, match=r"panda is .*; expected an arm with a closed form"):
-        inverse_kinematics_in_chunks(library_robot("panda"), T)
+    with pytest.raises(ModelError, match=r"jaco is .*: how many branches there will be is open"):
+        inverse_kinematics_in_chunks(library_robot("jaco"), T)
+    with pytest.raises(ValueError, match=r"redundancy has shape \(3,\); expected \(\) or \(10,\)"):
+        inverse_kinematics_in_chunks(library_robot("panda"), T, 4, redundancy=np.zeros(3))
     assert not list(inverse_kinematics_in_chunks(arm, T[:0]))

@@ -78,7 +78,7 @@ class Classification:
 
     @property
     def closed_form(self) -> bool:
-        """Whether dhkit has a closed form of its inverse kinematics."""
+        """Whether all solutions of a pose have a closed form; of seven joints, those at a redundancy: ``redundant``."""
         return self.family is not None
 
     @property

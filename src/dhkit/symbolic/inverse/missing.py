@@ -8,15 +8,21 @@ from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element
 
 _ANY_ARM = "use arm.ik_numeric"
-_SIX_OR_SEVEN = "use arm.ik, which finds its solutions without, or arm.ik_numeric"
+_SIX = "use arm.ik, which finds its solutions without, or arm.ik_numeric"
+_SEVEN = (
+    "no closed form for a pose alone: 7 joints have more freedom than a pose asks for; "
+    "use arm.ik(T, redundancy=...), which returns all solutions at a redundancy, or arm.ik_numeric"
+)
 
 
 def why_not(chain: ExactChain) -> str:
     """Return one sentence on the condition of a closed form that is not met, and on the alternatives."""
     n = chain.n
     kinds = chain.description.kinds
+    if kinds == "RRRRRRR":
+        return _SEVEN
     count = f"{n}R" if set(kinds) == {"R"} else kinds
-    instead = _SIX_OR_SEVEN if count in ("6R", "7R") else _ANY_ARM
+    instead = _SIX if count == "6R" else _ANY_ARM
     return f"no closed form is known for these {count} axes: {_missing(chain)}; {instead}"
 
 
