@@ -194,3 +194,35 @@ def test_inputs_that_do_not_fit_are_refused():
             (PipelineStep(graph),),
             ("y",),
         )
+
+
+def test_names_that_no_step_has_are_refused():
+    whole = square_roots()
+    first, *others = whole.steps
+    with pytest.raises(ValueError, match="nonsense is not one number of each of"):
+        replace(whole, steps=(replace(first, skips="nonsense"), *others))
+    with pytest.raises(ValueError, match="nothing is not one number of each of"):
+        replace(whole, steps=(replace(first, places="nothing"), *others))
+    with pytest.raises(ValueError, match="no step has the output missing"):
+        replace(whole, results=("missing",))
+
+
+def test_inputs_of_all_items_may_be_one_output_of_a_single_item():
+    factor, x, own = ca.SX.sym("factor"), ca.SX.sym("x", 16), ca.SX.sym("pair", 2)
+    first = Graph.of("first", {"parameters": factor, "x": x}, {"pairs": factor * x})
+    second = Graph.of("second", {"parameters": factor, "pair": own}, {"y": own[0] - own[1]})
+    pipeline = Pipeline(
+        "differences",
+        (Variable("parameters", (1,)), Variable("x", (16,))),
+        (PipelineStep(first), PipelineStep(second, 8, each={"pair": "pairs"})),
+        ("y",),
+    )
+    rows = np.random.default_rng(0).uniform(-1, 1, (3, 16))
+    expected = 2.0 * (rows[:, :8] - rows[:, 8:])
+    run = kernel("test_differences", "", lambda: pipeline)
+    for prepare in (lambda: None, run.compile):
+        prepare()
+        found = np.empty((3, 8))
+        run(np.array([2.0]), [rows], [found])
+        assert np.allclose(found, expected, rtol=0, atol=1e-15)
+    assert "compiled" in repr(run)

@@ -94,7 +94,8 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
 def _solved(description: Description, poses: Array) -> IKSolutions:
     """Return the solutions of matrices (N, 4, 4)."""
     first, *others = six_joints(description).ways
-    # Interpreted, the program takes longer than what is saved; for 0 items nothing is counted.
+    # Interpreted, the program for single poses takes longer than what it saves. It is asked about a batch of no items,
+    # which counts nothing towards compiling.
     if has_curves(description) or not first.pose_kernel.is_compiled_for(0):
         return _solved_with_care(description, poses)
     goals = poses.reshape(-1, 16)

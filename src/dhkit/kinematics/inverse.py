@@ -1,4 +1,4 @@
-"""Inverse kinematics in closed form: all branches of a batch of poses."""
+"""Inverse kinematics of a batch of poses: in closed form, or as the arm's classification says otherwise."""
 
 from __future__ import annotations
 

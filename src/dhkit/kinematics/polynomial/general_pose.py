@@ -480,7 +480,7 @@ def _polished(parameters: _SX, arm: _Arm, goal: _SX, q: list[_SX]) -> tuple[_SX,
 def _tool_and_jacobian(
     arm: _Arm, directions: list[_SX], points: list[_SX], q: _SX
 ) -> tuple[_SX, _SX]:
-    """Return the tool's pose, 4 x 4, m, and its Jacobian, 6 x 6, of the position as a share of the reach."""
+    """Return the tool's pose, 4 x 4, m, and the geometric Jacobian, 6 x 6, with lengths as shares of the reach."""
     R = ca.SX.eye(3)
     p = ca.SX.zeros(3, 1)
     axes = []

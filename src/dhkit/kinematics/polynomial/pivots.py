@@ -1,4 +1,4 @@
-"""Gauss's elimination in symbols, with row pivots, for programs whose items choose different pivots."""
+"""Gaussian elimination with partial pivoting in symbols, for programs whose items choose different pivots."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _TINY = 1e-300
 def eliminated(
     matrix: list[list[_SX]], right: list[_SX] | None = None
 ) -> tuple[list[list[_SX]], list[_SX], _SX]:
-    """Return a matrix and a right side after Gauss's elimination with row pivots, and the sign of the exchanges."""
+    """Return a matrix and a right side after Gaussian elimination with partial pivoting, and the sign of the exchanges.
+
+    Without a right side, the matrix's last column is returned in its place.
+    """
     A = [list(row) for row in matrix]
     if right is not None:
         A = [[*row, x] for row, x in zip(A, right, strict=True)]

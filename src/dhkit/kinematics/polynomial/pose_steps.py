@@ -1,4 +1,4 @@
-"""Steps of programs for one pose that all ways of elimination share: from values to the roots of the polynomial."""
+"""Steps of programs for one pose that all ways of elimination share: from values to roots, then to sorted solutions."""
 
 from __future__ import annotations
 
@@ -317,19 +317,22 @@ def known_solutions(
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
         "summary": ca.vertcat(kind, at_tried(is_outside)),
         "details": ca.vertcat(*details),
-        # Roots that are skipped have the key 0.
+        # Roots without a solution come last, with the key 0, as skipped ones have: all other keys are negative.
         "key": ca.if_else(kind != NONE, at_tried(order) - _BELOW_ALL, 0.0),
     }
     return Graph.of("solutions", inputs, outputs)
 
 
 def _reciprocals(numbers: list[_SX]) -> list[_SX]:
-    """Return 1 / x of positive numbers, with one division for each eight, for it takes as long as some 16 products."""
+    """Return 1 / x of positive numbers, with one division for each eight: a division takes as long as some 16 products.
+
+    With the products b_k of those before x_k and a_k of those from x_k on, 1 / x_k = b_k a_(k+1) / (b_h a_h) for any h.
+    """
     reciprocals: list[_SX] = []
     for begin in range(0, len(numbers), _TOGETHER):
         part = numbers[begin : begin + _TOGETHER]
-        # before[k] is the product of those before k, and after[k] that of those behind k. CasADi would make 1 / x of
-        # y / (x y) where it sees the same y: it does not see the product of all in that of two halves.
+        # CasADi would make 1 / x of y / (x y) where it sees the same y. It does not see the product of all in that of
+        # two halves.
         one = ca.SX(1.0)
         before = list(accumulate(part, operator.mul, initial=one))
         after = list(accumulate(reversed(part), operator.mul, initial=one))[::-1]

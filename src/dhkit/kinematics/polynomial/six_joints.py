@@ -61,6 +61,7 @@ class SixJoints:
         """
         variants = General.of(self.description).variants()
         if self.two_parallel is not None:
+            # Its polynomial is in joint 1; the roots of those in joint 2 lie elsewhere.
             return [self.two_parallel, *(CompiledGeneral(x) for x in variants if x.joint == 2)]
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_TRIALS, 6))
         poses = forward_kinematics(self.description, q).reshape(-1, 16)

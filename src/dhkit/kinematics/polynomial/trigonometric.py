@@ -28,7 +28,7 @@ _NO_PARAMETERS = np.zeros(1)
 
 # What is known of a root.
 NONE = 0.0
-"""It is not real: there is no solution."""
+"""It is not real: there is no solution. Outputs of skipped items are 0, so that this has to be 0."""
 SOLUTION = 1.0
 """There is one solution, and it is not singular."""
 NEAR_SOLUTION = 1.5

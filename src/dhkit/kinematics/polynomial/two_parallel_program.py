@@ -124,9 +124,9 @@ def solution_function(meeting: tuple[int, int]) -> ca.Function:
 
 
 def _twist_and_jacobian(p: Numbers, T: SX, q: list[SX]) -> tuple[SX, SX]:
-    """Return the twist to the tool's pose from that at joint values, 6 x 1, and the Jacobian, 6 x 6, of the position.
+    """Return the error of the tool's pose at joint values as a twist, 6 x 1, and the geometric Jacobian, 6 x 6.
 
-    Lengths are shares of the reach.
+    Linear parts come first, with lengths as shares of the reach.
     """
     R, shift, axes, end = _forward(p, T, q)
     R_goal, _ = last_frame(p, T)

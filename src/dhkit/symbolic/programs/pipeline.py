@@ -106,8 +106,21 @@ class Pipeline:
                         f"{step.graph.name}: {variable.name} has {variable.size} entries, "
                         f"but {source} has {items} times {size}"
                     )
+            self._check_masks(step, sizes)
             for variable in step.outputs:
                 sizes[variable.name] = (step.items, variable.size)
+        for name in self.results:
+            if name not in sizes:
+                raise ValueError(f"{self.name}: no step has the output {name}")
+
+    def _check_masks(self, step: PipelineStep, sizes: Mapping[str, tuple[int, int]]) -> None:
+        """Raise ValueError unless what a step skips and where it puts its outputs is one number of each item."""
+        own = {one.name: (step.items, one.size) for one in step.outputs}
+        for name, known in ((step.skips, sizes), (step.places, own)):
+            if name and known.get(name) != (step.items, 1):
+                raise ValueError(
+                    f"{step.graph.name}: {name} is not one number of each of {step.items} items"
+                )
 
     def with_reciprocals(self) -> Pipeline:
         """Return the program with fewer divisions, see :meth:`Graph.with_reciprocals`."""
