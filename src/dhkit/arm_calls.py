@@ -16,7 +16,6 @@ from dhkit.dynamics.regressor import (
 )
 from dhkit.errors import DhkitError
 from dhkit.kernels import FastCall, Kernel, SingleCall, never
-from dhkit.kinematics.arm_angle_intervals import arm_angle_intervals
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
 from dhkit.kinematics.jacobian import (
@@ -30,6 +29,7 @@ from dhkit.kinematics.pose_call import (
     pose_call,
     redundant_call,
 )
+from dhkit.kinematics.root_intervals import intervals_by_roots
 from dhkit.kinematics.solutions import IKSolutions
 
 ArrayCall: TypeAlias = Callable[..., Array | None]
@@ -170,7 +170,7 @@ class ArmCalls:
             self.ik.compile()
         if isinstance(self.ik_at_redundancy, RedundantCall):
             self.ik_at_redundancy.compile()
-        intervals = arm_angle_intervals(self._description)
+        intervals = intervals_by_roots(self._description)
         if intervals is not None:
             intervals.compile()
         yield "ik"

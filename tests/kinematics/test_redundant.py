@@ -8,7 +8,8 @@ from arms_without_closed_form import GEN3, SEVEN
 from dhkit import Arm
 from dhkit.errors import UnreachableError
 from dhkit.kinematics import IKStatus
-from dhkit.kinematics.redundant import redundancy_of
+from dhkit.kinematics.redundant import redundancy_of, redundancy_range
+from dhkit.kinematics.root_intervals import intervals_by_roots
 from dhkit.kinematics.solver import solver_for
 
 CLOSES = 1e-12
@@ -244,8 +245,8 @@ def test_a_preference_chooses_the_best_of_the_tried_values():
 
 
 def angles_on_the_wrong_side(arm, T):
-    """Return how many arm angles of a fine grid are inside an interval but not allowed, or the other way round."""
-    grid = np.linspace(-np.pi, np.pi, 20_001)
+    """Return how many values of a fine grid are inside an interval but not allowed, or the other way round."""
+    grid = np.linspace(*redundancy_range(arm.description), 20_001)
     intervals = arm.redundancy_intervals(T)
     found = arm.ik(np.broadcast_to(T, (len(grid), 4, 4)), redundancy=grid)
     inside = np.zeros(len(grid), dtype=bool)
@@ -269,6 +270,48 @@ def test_intervals_of_an_arm_angle_are_those_of_a_fine_grid(name, law):
         for q in rng.uniform(-limit, limit, (law.samples(1_000, 20), 7))
     )
     law.holds("angles on the wrong side of an end", wrong, 0, name)
+
+
+@pytest.mark.law
+@pytest.mark.parametrize(
+    "name", ["Franka Panda", "UFACTORY xArm 7", "oblique elbow and wrist", "two turns"]
+)
+def test_intervals_of_joint_7_are_those_of_a_fine_grid(name, law):
+    """Half a degree apart, samples had missed an interval or a gap at one pose in a hundred."""
+    arm = SEVEN["Franka Panda" if name == "two turns" else name]
+    numbers = arm.description.numbers
+    lower, upper = np.maximum(numbers.lower, -2.6), np.minimum(numbers.upper, 2.6)
+    lower[6], upper[6] = (-5.0, 6.1) if name == "two turns" else (-2.8, 2.8)
+    arm = arm.with_limits(lower=lower, upper=upper)
+    rng = np.random.default_rng(8)
+    wrong = sum(
+        angles_on_the_wrong_side(arm, arm.fk(q))
+        for q in rng.uniform(lower, upper, (law.samples(1_000, 20), 7))
+    )
+    law.holds("values on the wrong side of an end", wrong, 0, name)
+
+
+@pytest.mark.parametrize("name", ["Franka Panda", "KUKA iiwa 14"])
+def test_compiled_intervals_are_those_of_the_interpreter(name):
+    arm = SEVEN[name]
+    limit = np.full(7, 2.2)
+    arm = arm.with_limits(lower=-limit, upper=limit)
+    by_roots = intervals_by_roots(arm.description)
+    poses = [arm.fk(q) for q in np.random.default_rng(14).uniform(-limit, limit, (20, 7))]
+    interpreted = [by_roots.interpreted(T) for T in poses]
+    by_roots.compile()
+    for T, expected in zip(poses, interpreted, strict=True):
+        found = by_roots(T)
+        assert np.allclose(found, expected, rtol=0, atol=1e-6)
+        assert arm.redundancy_intervals(T) == found
+        assert np.allclose(arm.redundancy_intervals(T.tolist()), found, rtol=0, atol=1e-6)
+    assert by_roots(np.eye(3)) is None and by_roots(poses[0].tolist()) is None
+    far = poses[0].copy()
+    far[:3, 3] += 10
+    assert by_roots(far) == []
+    for wrong in (np.full((4, 4), np.nan), np.ones((4, 4))):
+        with pytest.raises(ValueError, match="T is not a pose"):
+            arm.redundancy_intervals(wrong)
 
 
 @pytest.mark.parametrize(

@@ -154,7 +154,7 @@ class PipelineInterpreter:
                 run(parameters, rows, results)
                 found = dict(zip((one.name for one in step.graph.outputs), results, strict=True))
                 if step.skips:
-                    is_skipped = known[step.skips][:, 0] != 0.0
+                    is_skipped = known[step.skips].ravel() != 0.0
                     for x in results:
                         x[is_skipped] = 0.0
                 if step.places:

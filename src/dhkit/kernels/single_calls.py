@@ -63,6 +63,10 @@ The result is an array, or for a program with several outputs the pair of the fi
 """
 
 
+Agreement: TypeAlias = Callable[[Sequence[NDArray[Any]], Sequence[NDArray[Any]]], bool]
+"""Tells whether two lists of outputs agree."""
+
+
 def never(*_: object) -> None:
     """Take no arguments: every call goes the ordinary way."""
 
@@ -82,6 +86,9 @@ class SingleCall:
         Whether a result that is not finite goes the ordinary way, which says why.
     example
         States at which a new function is compared with the kernel; arbitrary ones unless given.
+    are_alike
+        Tells of the function's and the kernel's outputs there, as flat arrays, whether the function may be used; by
+        default whether they differ by rounding.
     """
 
     def __init__(
@@ -92,6 +99,7 @@ class SingleCall:
         install: Callable[[FastCall], None],
         refuses_nan: bool = False,
         example: Sequence[ArrayLike] | None = None,
+        are_alike: Agreement | None = None,
     ) -> None:
         self._kernel = kernel
         self._parameters = parameters
@@ -99,6 +107,7 @@ class SingleCall:
         self._install = install
         self._refuses_nan = refuses_nan
         self._example = example
+        self._are_alike = are_alike or _are_near
         self._background = Background(kernel.name, self._compile_in_thread)
 
     def __call__(self, *arguments: object) -> Any:
@@ -167,9 +176,11 @@ class SingleCall:
         if len(expected) == 1:
             batch = [np.repeat(state[None], _SEVERAL, axis=0) for state in states]
             many = function(*batch, None)
-            return many is not None and all(_are_near([one], expected) for one in (found, *many))
+            return many is not None and all(
+                self._are_alike([one], expected) for one in (found, *many)
+            )
         array, packed = found
-        return _are_near([array, *unpacked(packed, graph, self._kernel.types)], expected)
+        return self._are_alike([array, *unpacked(packed, graph, self._kernel.types)], expected)
 
 
 def _different_states(shapes: Sequence[tuple[int, ...]]) -> list[Array]:

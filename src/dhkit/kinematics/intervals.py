@@ -1,7 +1,8 @@
 """Intervals of the redundancy in which an arm of seven joints reaches a pose inside its limits.
 
-With a spherical shoulder and a spherical wrist they end at roots of equations in the arm angle, see
-:mod:`dhkit.kinematics.interval_program`. For other arms joint 7 is sampled.
+With a closed form at a given redundancy they end at roots of equations in the redundancy, see
+:mod:`dhkit.kinematics.arm_angle_program` and :mod:`dhkit.kinematics.joint_7_program`. For other arms, and without
+limits, the redundancy is sampled.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description, takes_robot
 from dhkit.kernels import pose_rows
-from dhkit.kinematics.arm_angle_intervals import arm_angle_intervals
 from dhkit.kinematics.candidates import are_poses
 from dhkit.kinematics.redundant import AtRedundancy, check_seven, values_to_try
+from dhkit.kinematics.root_intervals import intervals_by_roots
 
 _STEP = np.pi / 360
 _ACCURACY = 1e-9
@@ -30,10 +31,14 @@ def redundancy_intervals(
 ) -> list[tuple[float, float]]:
     """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
 
-    Of an arm with a spherical shoulder and a spherical wrist their ends are roots of equations, to rounding; an
-    interval narrower than 3e-6 rad may be missing. For other arms joint 7 is tried at steps of half a degree, and the
-    ends are found to 1e-9 rad: an interval that is narrower than a step may be missing. So is the arm angle where the
-    arm is stretched along axis 1, or axis 7, so that joints 1 and 3, or 5 and 7, turn about one line at every angle.
+    Of an arm with a closed form at a given redundancy their ends are roots of equations. Those of an arm angle are
+    known to rounding, those of joint 7 to 1e-9 rad, or 1e-5 rad where two roots nearly coincide. An interval narrower
+    than 3e-6 rad may be missing.
+
+    For other arms, and without limits, the redundancy is tried at steps of half a degree, and the ends are found to
+    1e-9 rad: an interval that is narrower than a step may be missing. So is an arm angle where the arm is stretched
+    along axis 1, or axis 7, so that joints 1 and 3, or 5 and 7, turn about one line at every angle; and joint 7 where
+    the equations are not known well, at a few poses in a thousand.
 
     Parameters
     ----------
@@ -63,8 +68,7 @@ def redundancy_intervals(
     >>> [(round(begin, 3), round(end, 3)) for begin, end in redundancy_intervals(panda, T)]
     [(-0.684, 2.254)]
     """
-    arm_angle = arm_angle_intervals(description)
-    by_roots = arm_angle if limits else None
+    by_roots = intervals_by_roots(description) if limits else None
     if by_roots is not None and (intervals := by_roots(T)) is not None:
         return intervals
     pose = pose_rows(T)
@@ -82,10 +86,7 @@ def redundancy_intervals(
         usable = found.allowed if limits else found.valid
         return np.asarray(usable.any(axis=-1))
 
-    if limits or arm_angle is None:
-        return _sampled(is_reached, values_to_try(description))
-    # Without limits an arm angle is as good as any other.
-    return [(-np.pi, np.pi)] if is_reached(np.zeros(1)).any() else []
+    return _sampled(is_reached, values_to_try(description))
 
 
 def _sampled(

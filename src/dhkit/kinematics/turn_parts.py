@@ -1,9 +1,13 @@
-"""What the program of :mod:`dhkit.kinematics.interval_program` takes and returns: the parts of a turn."""
+"""What the programs of intervals of the redundancy take and return: the parts of a turn.
+
+See :mod:`dhkit.kinematics.arm_angle_program` and :mod:`dhkit.kinematics.joint_7_program`.
+"""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from bisect import bisect_left
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,23 +15,26 @@ from dhkit.description import Array
 from dhkit.kinematics.closed_form.family import Fit, limit_parameters
 
 JOINTS = 7
-PARTS = 64
-"""Number of parts of a turn, many of them empty: two roots of 28 equations, and room to fill vectors."""
-RESULTS = ("sorted_part", "state")
-"""Outputs of the program:
+RESULTS = ("sorted_begin", "sorted_inside", "state")
+"""Outputs of a program:
 
-- of each part, in ascending order, where it begins, rad, and whether the arm is inside its limits in it; the first one
-  begins at -pi, and the last one is empty;
+- where each part begins, rad, in ascending order from -pi to pi, where the last one is empty, as others are;
+- whether the arm can be inside its limits in it, 1 or 0;
 - ``state``: ``KNOWN``, or why the parts are without meaning.
 """
-KNOWN, ALIGNED, BEYOND, NO_POSE = range(4)
-"""States; ``ALIGNED``: the outer joints of the shoulder or of the wrist turn about one line at every arm angle."""
+ARM_ANGLE_PARTS = 64
+"""Number of parts, many of them empty: two roots of 28 equations, and room to fill vectors."""
+JOINT_7_PARTS = 152
+"""Likewise: 16 roots of 6 polynomials, 8 of 5, 2 of 4 equations, and room."""
+KNOWN, UNKNOWN, BEYOND, NO_POSE = range(4)
+"""States; ``UNKNOWN``: of an arm angle, the outer joints of the shoulder or of the wrist turn about one line at every
+value; of joint 7, the polynomials are not known well enough."""
 TOUCHING = 1e-12
 """Share by which a root may be missed by rounding, and angle, rad, between two that are taken as one."""
 
 
 def interval_parameters(fit: Fit, offset: Array, lower: Array, upper: Array) -> Array:
-    """Return the program's parameters: those of the fit, and the limits of the angles theta = q + offset.
+    """Return a program's parameters: those of the fit, and those that ``limit_symbols.Limits`` reads.
 
     Parameters
     ----------
@@ -37,31 +44,25 @@ def interval_parameters(fit: Fit, offset: Array, lower: Array, upper: Array) -> 
         Offsets and limits of the joints, shape (7,), rad.
     """
     begin, width = limit_parameters(lower, upper, [False] * JOINTS).reshape(JOINTS, 2).T
-    begin = begin + offset / math.tau
-    limits = math.tau * np.stack([begin, begin + width])
-    return np.concatenate(
-        [fit.vector(), begin, width, np.cos(limits).ravel(), np.sin(limits).ravel()]
-    )
+    limits = math.tau * np.stack([begin, begin + width]) + offset
+    turns = (begin, width, offset / math.tau)
+    return np.concatenate([fit.vector(), *turns, *np.cos(limits), *np.sin(limits)])
 
 
-def joined(parts: Array, state: float) -> list[tuple[float, float]] | None:
-    """Return the intervals of ``RESULTS``, parts that are neighbours joined; None where they have no meaning.
+def joined(begins: Sequence[float], are_inside: Sequence[float]) -> list[tuple[float, float]]:
+    """Return the intervals of parts, neighbours joined.
 
     Parameters
     ----------
-    parts
-        The parts, shape (64, 2): where they begin, rad, and whether the arm is inside its limits.
-    state
-        The state.
+    begins, are_inside
+        Where the parts begin, rad, and whether the arm is inside its limits in them.
     """
-    if state == BEYOND:
-        return []
-    if state != KNOWN:
-        return None
     intervals = []
-    rows = parts.tolist()
     start = None
-    for (begin, is_inside), (end, _) in pairwise(rows):
+    # Those that begin at pi are empty.
+    count = bisect_left(begins, math.pi) + 1
+    begins = begins[:count]
+    for begin, end, is_inside in zip(begins, begins[1:], are_inside, strict=False):
         if end - begin <= TOUCHING:
             continue
         if is_inside and start is None:
@@ -70,5 +71,33 @@ def joined(parts: Array, state: float) -> list[tuple[float, float]] | None:
             intervals.append((start, begin))
             start = None
     if start is not None:
-        intervals.append((start, np.pi))
+        intervals.append((start, math.pi))
     return intervals
+
+
+def unrolled(
+    intervals: Sequence[tuple[float, float]], lower: float, upper: float
+) -> list[tuple[float, float]]:
+    """Return the intervals of all turns between two limits, of those of one turn, [-pi, pi].
+
+    Parameters
+    ----------
+    intervals
+        Intervals in ascending order, rad.
+    lower, upper
+        The limits, rad.
+    """
+    found: list[tuple[float, float]] = []
+    first = math.floor((lower + math.pi) / math.tau)
+    last = math.floor((upper + math.pi) / math.tau)
+    for turn in range(first, last + 1):
+        for begin, end in intervals:
+            begin_here = max(begin + turn * math.tau, lower)
+            end_here = min(end + turn * math.tau, upper)
+            if end_here - begin_here <= TOUCHING:
+                continue
+            # The end of one turn is the beginning of the next one.
+            if found and begin_here - found[-1][1] <= TOUCHING:
+                begin_here = found.pop()[0]
+            found.append((begin_here, end_here))
+    return found

@@ -76,16 +76,7 @@ def spherical_shoulder_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[
     Joint 4 is beyond its position in the stretched arm (``q4+``) or before it, the shoulder in front of the plane of
     axes 5 and 6 (on the side of axis 5 x axis 6) or at its back, and q2 positive or negative.
     """
-    T = pose.seen(p["T_first_world"], p["T_tool_last"])
-    # Frame 6 is the last frame turned back by theta_7.
-    c, s = add_angles(pose.free, p["offset7"])
-    x, y, z = T.rotation
-    link_6 = (weighted_sum((c, -s), (x, y)), weighted_sum((s, c), (x, y)), z)
-    centre = weighted_sum((1.0, *p["centre"]), (T.position, *link_6))
-
-    # S - O as seen from link 6, before its twist.
-    to_shoulder = turned_about_x(tuple(-dot(axis, centre) for axis in link_6), p["alpha6"])
-
+    link_6, centre, to_shoulder = at_joint_7(p, pose)
     branches: list[Branch] = []
     for bend in SIGNS:
         elbow = elbow_bent(p, centre, bend, pose)
@@ -125,6 +116,20 @@ def spherical_shoulder_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[
                     )
                 )
     return branches
+
+
+def at_joint_7(
+    p: Mapping[str, SX], pose: PoseSymbols
+) -> tuple[tuple[Vector, Vector, Vector], Vector, Vector]:
+    """Return frame 6's axes, O in frame 0, and S - O as seen from link 6 before its twist, at q7 = ``pose.free``."""
+    T = pose.seen(p["T_first_world"], p["T_tool_last"])
+    # Frame 6 is the last frame turned back by theta_7.
+    c, s = add_angles(pose.free, p["offset7"])
+    x, y, z = T.rotation
+    link_6 = (weighted_sum((c, -s), (x, y)), weighted_sum((s, c), (x, y)), z)
+    centre = weighted_sum((1.0, *p["centre"]), (T.position, *link_6))
+    seen = tuple(-dot(axis, centre) for axis in link_6)
+    return link_6, centre, turned_about_x(seen, p["alpha6"])
 
 
 @dataclass(frozen=True)

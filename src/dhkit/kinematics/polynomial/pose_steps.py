@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from itertools import accumulate
 from typing import Any, TypeAlias
@@ -84,8 +85,7 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """
     return (
         _known_coefficients(parameters),
-        _first_estimates(parameters),
-        _better_estimates(parameters),
+        *estimate_steps(parameters, PolynomialSource(DEGREE)),
         _angles(parameters),
         _sorted(parameters, "sorted_roots", "is_idle", dict.fromkeys((*_OF_ROOT, "is_idle"), 1)),
     )
@@ -133,23 +133,64 @@ def _known_coefficients(parameters: _SX) -> PipelineStep:
     return PipelineStep(graph, shared={"values": "value"})
 
 
-def _first_estimates(parameters: _SX) -> PipelineStep:
+@dataclass(frozen=True)
+class PolynomialSource:
+    """Where a pipeline has a trigonometric polynomial, and the estimates of its roots.
+
+    The coefficients may be those of one lane of several: then they are every ``lanes``-th number.
+    """
+
+    degree: int
+    numbers: str = "numbers"
+    sizes: str = "sizes"
+    """Outputs with the coefficients, and with their absolute values."""
+    lane: int = 0
+    lanes: int = 1
+    x: str = "x"
+    y: str = "y"
+    """Outputs with the real and the imaginary part of each root."""
+
+    @property
+    def roots(self) -> int:
+        """The number of roots."""
+        return 2 * self.degree
+
+    def symbol(self, name: str) -> tuple[_SX, _SX]:
+        """Return the symbol of all numbers of an input, and those of this polynomial."""
+        every = ca.SX.sym(name, (2 * self.degree + 1) * self.lanes)
+        return every, every[self.lane :: self.lanes]
+
+
+def estimate_steps(parameters: _SX, source: PolynomialSource) -> tuple[PipelineStep, ...]:
+    """Return the steps that find all roots of a polynomial by Aberth's method, a root in each lane.
+
+    Parameters
+    ----------
+    parameters
+        Symbols of the pipeline's parameters.
+    source
+        The polynomial.
+    """
+    return _first_estimates(parameters, source), _better_estimates(parameters, source)
+
+
+def _first_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
     """Return the step with the first estimates of the roots, beside the unit circle inside and outside in turn."""
     index = ca.SX.sym("index")
     is_odd = index - 2.0 * ca.floor(index / 2.0) > 0.5
     radius = ca.if_else(is_odd, FIRST_RADII[1], FIRST_RADII[0])
-    angle = FIRST_ANGLE + index * (math.tau / ROOTS)
+    angle = FIRST_ANGLE + index * (math.tau / source.roots)
     inputs = {"parameters": parameters, "index": index}
-    outputs = {"x": radius * ca.cos(angle), "y": radius * ca.sin(angle)}
+    outputs = {source.x: radius * ca.cos(angle), source.y: radius * ca.sin(angle)}
     graph = Graph.of("first_estimates", inputs, outputs)
-    return PipelineStep(graph, ROOTS, each={"index": "index"})
+    return PipelineStep(graph, source.roots, each={"index": "index"})
 
 
-def _better_estimates(parameters: _SX) -> PipelineStep:
+def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
     """Return Aberth's step for each root, which is repeated until none moves."""
-    numbers = ca.SX.sym("numbers", _COEFFICIENTS)
-    index, root, others = _root_and_others()
-    sizes = ca.SX.sym("sizes", _COEFFICIENTS)
+    every_number, numbers = source.symbol("numbers")
+    every_size, sizes = source.symbol("sizes")
+    index, root, others = _root_and_others(source.roots)
     apart = [root - other for other in others]
     squares = []
     for j, z in enumerate(apart):
@@ -159,20 +200,21 @@ def _better_estimates(parameters: _SX) -> PipelineStep:
     repulsion = complex_of(ca.SX(0.0), ca.SX(0.0))
     for z, over in zip(apart, _reciprocals(squares), strict=True):
         repulsion = repulsion + complex_of(z.x * over, -z.y * over)
-    polynomial = polynomial_of(numbers, DEGREE)
+    polynomial = polynomial_of(numbers, source.degree)
     moved, step = aberth_step(polynomial, ca.vertsplit(sizes), root, repulsion)
     inputs = {
         "parameters": parameters,
-        "numbers": numbers,
-        "sizes": sizes,
+        "numbers": every_number,
+        "sizes": every_size,
         **_inputs_of(index, root, others),
     }
-    outputs = {"x": moved.x, "y": moved.y, "goes_on": ca.if_else(step >= CONVERGED, 1.0, 0.0)}
+    goes_on = ca.if_else(step >= CONVERGED, 1.0, 0.0)
+    outputs = {source.x: moved.x, source.y: moved.y, "goes_on": goes_on}
     return PipelineStep(
         Graph.of("better_estimates", inputs, outputs),
-        ROOTS,
-        each={"index": "index"},
-        shared={"numbers": "numbers", "sizes": "sizes", "xs": "x", "ys": "y"},
+        source.roots,
+        each={"index": "index", "x": source.x, "y": source.y},
+        shared={"numbers": source.numbers, "sizes": source.sizes, "xs": source.x, "ys": source.y},
         most=MOST_STEPS,
     )
 
@@ -182,7 +224,7 @@ def _angles(parameters: _SX) -> PipelineStep:
     numbers = ca.SX.sym("numbers", _COEFFICIENTS)
     error = ca.SX.sym("error")
     first = ca.SX.sym("first")
-    index, root, others = _root_and_others()
+    index, root, others = _root_and_others(ROOTS)
     angle, height, is_real = nearly_real(polynomial_of(numbers, DEGREE), root, error)
     nearest = ca.SX(math.inf)
     for j, other in enumerate(others):
@@ -236,11 +278,7 @@ def _sorted(parameters: _SX, name: str, key: str, sizes: Mapping[str, int]) -> P
     index = ca.SX.sym("index")
     own = ca.SX.sym("own_key")
     keys = ca.SX.sym("keys", ROOTS)
-    place = ca.SX(0.0)
-    for j, other in enumerate(ca.vertsplit(keys)):
-        # Roots with equal keys stay in their order.
-        is_earlier = ca.logic_and(other == own, float(j) < index)
-        place = place + ca.if_else(ca.logic_or(other < own, is_earlier), 1.0, 0.0)
+    place = place_in_order(own, index, keys)
     values = {source: ca.SX.sym(source, size) for source, size in sizes.items()}
     inputs = {"parameters": parameters, "index": index, "own_key": own, "keys": keys, **values}
     outputs = {f"sorted_{source}": value for source, value in values.items()}
@@ -251,6 +289,23 @@ def _sorted(parameters: _SX, name: str, key: str, sizes: Mapping[str, int]) -> P
         shared={"keys": key},
         places="place",
     )
+
+
+def place_in_order(own: _SX, index: _SX, keys: _SX) -> _SX:
+    """Return the place of an item among all in ascending order of their keys; equal ones stay in their order.
+
+    Parameters
+    ----------
+    own, index
+        The item's key and number.
+    keys
+        The keys of all items.
+    """
+    place = ca.SX(0.0)
+    for j, other in enumerate(ca.vertsplit(keys)):
+        is_earlier = ca.logic_and(other == own, float(j) < index)
+        place = place + ca.if_else(ca.logic_or(other < own, is_earlier), 1.0, 0.0)
+    return place
 
 
 def known_solutions(
@@ -342,12 +397,12 @@ def _reciprocals(numbers: list[_SX]) -> list[_SX]:
     return reciprocals
 
 
-def _root_and_others() -> tuple[_SX, Extension, list[Extension]]:
+def _root_and_others(count: int) -> tuple[_SX, Extension, list[Extension]]:
     """Return symbols of a root's number, of the root, and of all roots."""
     index = ca.SX.sym("index")
     root = complex_of(ca.SX.sym("x"), ca.SX.sym("y"))
-    xs = ca.vertsplit(ca.SX.sym("xs", ROOTS))
-    ys = ca.vertsplit(ca.SX.sym("ys", ROOTS))
+    xs = ca.vertsplit(ca.SX.sym("xs", count))
+    ys = ca.vertsplit(ca.SX.sym("ys", count))
     return index, root, [complex_of(x, y) for x, y in zip(xs, ys, strict=True)]
 
 

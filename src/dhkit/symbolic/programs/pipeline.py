@@ -116,8 +116,9 @@ class Pipeline:
     def _check_masks(self, step: PipelineStep, sizes: Mapping[str, tuple[int, int]]) -> None:
         """Raise ValueError unless what a step skips and where it puts its outputs is one number of each item."""
         own = {one.name: (step.items, one.size) for one in step.outputs}
+        fitting = ((step.items, 1), (1, step.items))
         for name, known in ((step.skips, sizes), (step.places, own)):
-            if name and known.get(name) != (step.items, 1):
+            if name and known.get(name) not in fitting:
                 raise ValueError(
                     f"{step.graph.name}: {name} is not one number of each of {step.items} items"
                 )

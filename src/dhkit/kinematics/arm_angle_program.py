@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from typing import Any, TypeAlias
 
@@ -23,17 +23,17 @@ import casadi as ca
 
 from dhkit.kinematics.closed_form.arm_angle import BentArm, bent_arms
 from dhkit.kinematics.closed_form.family import Fit, PoseSymbols, Vector
-from dhkit.kinematics.closed_form.formulas import SINGULAR, Pair, angle, hypot
+from dhkit.kinematics.closed_form.formulas import SINGULAR, angle, hypot
 from dhkit.kinematics.closed_form.program import is_pose
+from dhkit.kinematics.limit_symbols import LIMIT_NUMBERS, Limits, wave_root
+from dhkit.kinematics.polynomial.pose_steps import place_in_order
 from dhkit.kinematics.turn_parts import (
-    ALIGNED,
+    ARM_ANGLE_PARTS as PARTS,
     BEYOND,
-    JOINTS,
     KNOWN,
     NO_POSE,
-    PARTS,
     RESULTS,
-    TOUCHING,
+    UNKNOWN,
 )
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
 from dhkit.symbolic.programs.graph import Variable
@@ -50,31 +50,7 @@ _WAVES = 5
 """Number of waves of a triple of joints."""
 
 
-@dataclass(frozen=True)
-class _Limits:
-    """Symbols of the limits."""
-
-    begin: Sequence[_SX]
-    width: Sequence[_SX]
-    """Lower limits and ranges of the joints' angles, turns."""
-    ends: tuple[Sequence[Pair], Sequence[Pair]]
-    """Lower and upper limits of the joints' angles, as pairs."""
-
-    @classmethod
-    def read(cls, numbers: _SX) -> _Limits:
-        """Return the limits from the last parameters."""
-        begin, width, *pairs = (ca.vertsplit(part) for part in ca.vertsplit(numbers, JOINTS))
-        cosines, sines = pairs[:2], pairs[2:]
-        lower, upper = (list(zip(c, s, strict=True)) for c, s in zip(cosines, sines, strict=True))
-        return cls(begin, width, (lower, upper))
-
-    def inside(self, joint: int, turns: _SX) -> _SX:
-        """Return whether an angle, in turns, is inside the limits of a joint."""
-        beyond = turns - self.begin[joint]
-        return beyond - ca.floor(beyond) <= self.width[joint]
-
-
-def interval_program(fit: Fit) -> Pipeline:
+def arm_angle_program(fit: Fit) -> Pipeline:
     """Return the program of an arm with an arm angle: the tool's pose to ``RESULTS``.
 
     Parameters
@@ -83,8 +59,8 @@ def interval_program(fit: Fit) -> Pipeline:
         The arm as a member of its family.
     """
     count = len(fit.vector())
-    parameters = ca.SX.sym("parameters", count + 6 * JOINTS)
-    limits = _Limits.read(parameters[count:])
+    parameters = ca.SX.sym("parameters", count + LIMIT_NUMBERS)
+    limits = Limits.read(parameters[count:])
     steps = (
         _equations(parameters, fit, limits),
         _roots(parameters),
@@ -94,7 +70,7 @@ def interval_program(fit: Fit) -> Pipeline:
     return Pipeline("arm_angle_parts", inputs, steps, RESULTS)
 
 
-def _equations(parameters: _SX, fit: Fit, limits: _Limits) -> PipelineStep:
+def _equations(parameters: _SX, fit: Fit, limits: Limits) -> PipelineStep:
     """Return the step that finds the waves, and the equations of joints at their limits."""
     T = ca.SX.sym("T", 4, 4)
     p = fit.named(parameters[: len(fit.vector())])
@@ -119,10 +95,10 @@ def _equations(parameters: _SX, fit: Fit, limits: _Limits) -> PipelineStep:
     columns = [ca.vertcat(*column) for column in zip(*equations, strict=True)]
 
     is_aligned = ca.logic_or(*(_is_aligned(of_triples[k::2]) for k in range(2)))
-    state = ca.if_else(is_aligned, float(ALIGNED), float(KNOWN))
+    state = ca.if_else(is_aligned, float(UNKNOWN), float(KNOWN))
     state = ca.if_else(arms[0].elbow.miss == 0, state, float(BEYOND))
     state = ca.if_else(is_pose(T), state, float(NO_POSE))
-    elbows = [limits.inside(3, angle(arm.elbow.theta_4) / math.tau) for arm in arms]
+    elbows = [limits.inside(3, angle(arm.elbow.theta_4)) for arm in arms]
     outputs = {
         # Each equation is there for either of its roots.
         "equation": ca.vertcat(*(ca.vertcat(column, column) for column in columns)),
@@ -165,7 +141,7 @@ def _of_triple(axes: tuple[Vector, Vector, Vector], twists: tuple[_SX, _SX]) -> 
     return z[0] * sin_2, z[1] * sin_2, -z[2] * sin_1 * sin_2, x[2] * sin_1, -y[2] * sin_1
 
 
-def _at_limits(waves: Sequence[_Wave], limits: _Limits, joints: Sequence[int]) -> list[_Wave]:
+def _at_limits(waves: Sequence[_Wave], limits: Limits, joints: Sequence[int]) -> list[_Wave]:
     """Return the waves that are zero where a joint of a triple is at a limit, or where the outer ones may jump."""
     first_along, first_across, polar, last_along, last_across = waves
     first, middle, last = joints
@@ -195,29 +171,18 @@ def _is_aligned(of_bends: Sequence[Sequence[_Wave]]) -> _SX:
 
 
 def _roots(parameters: _SX) -> PipelineStep:
-    """Return the step that solves a + b cos(psi) + c sin(psi) = 0: item k has a root of equation k modulo 32, or pi.
-
-    With the length r of (b, c) and its direction phi, cos(psi - phi) = -a / r.
-    """
+    """Return the step of the roots: item k has one of equation k modulo 32, or pi."""
     equation = ca.SX.sym("equation", 3)
     index = ca.SX.sym("index")
     a, b, c = ca.vertsplit(equation)
-    r = hypot(b, c)
-    cosine = -a / ca.if_else(r > 0, r, 1.0)
-    square = 1.0 - cosine * cosine
-    is_touching = ca.fabs(square) < 2 * TOUCHING
-    is_root = ca.logic_and(r > 0, ca.logic_or(is_touching, square > 0))
-    sine = ca.sqrt(ca.if_else(is_touching, 0.0, ca.fmax(square, 0.0)))
-    sine = ca.if_else(index < float(_EQUATIONS), sine, -sine)
-    psi = ca.atan2(c * cosine + b * sine, b * cosine - c * sine)
-    psi = ca.if_else(is_root, psi, math.pi)
+    psi = wave_root((a, b, c), ca.if_else(index < float(_EQUATIONS), 1.0, -1.0))
     # The turn begins at the last number of the first half, which has no equation.
     psi = ca.if_else(index == _EQUATIONS - 1.0, -math.pi, psi)
     inputs = {"parameters": parameters, "equation": equation, "index": index}
     return PipelineStep(Graph.of("roots", inputs, {"root": psi}), PARTS, each={"index": "index"})
 
 
-def _parts(parameters: _SX, limits: _Limits) -> PipelineStep:
+def _parts(parameters: _SX, limits: Limits) -> PipelineStep:
     """Return the step that tells of the part from each root to the next one whether the arm is inside its limits."""
     index = ca.SX.sym("index")
     own = ca.SX.sym("root")
@@ -225,12 +190,8 @@ def _parts(parameters: _SX, limits: _Limits) -> PipelineStep:
     waves = ca.SX.sym("waves", 4 * _WAVES * 3)
     elbows = ca.SX.sym("elbows", 2)
 
-    place = ca.SX(0.0)
     following = ca.SX(math.pi)
-    for k, other in enumerate(ca.vertsplit(roots)):
-        # Equal ones stay in their order.
-        is_before = ca.logic_or(other < own, ca.logic_and(other == own, float(k) < index))
-        place = place + ca.if_else(is_before, 1.0, 0.0)
+    for other in ca.vertsplit(roots):
         following = ca.if_else(other > own, ca.fmin(other, following), following)
 
     middle = (own + following) / 2.0
@@ -251,8 +212,13 @@ def _parts(parameters: _SX, limits: _Limits) -> PipelineStep:
         "waves": waves,
         "elbows": elbows,
     }
+    outputs = {
+        "sorted_begin": own,
+        "sorted_inside": is_inside,
+        "place": place_in_order(own, index, roots),
+    }
     return PipelineStep(
-        Graph.of("parts", inputs, {"sorted_part": ca.vertcat(own, is_inside), "place": place}),
+        Graph.of("parts", inputs, outputs),
         PARTS,
         each={"index": "index"},
         shared={"roots": "root", "waves": "waves", "elbows": "elbows"},
@@ -260,14 +226,14 @@ def _parts(parameters: _SX, limits: _Limits) -> PipelineStep:
     )
 
 
-def _is_inside(values: Sequence[_SX], limits: _Limits, joints: Sequence[int]) -> _SX:
+def _is_inside(values: Sequence[_SX], limits: Limits, joints: Sequence[int]) -> _SX:
     """Return whether three joints are inside their limits for sin(theta_2) of either sign."""
     first_along, first_across, polar, last_along, last_across = values
-    first = ca.atan2(first_across, first_along) / math.tau
-    middle = ca.atan2(hypot(first_along, first_across), polar) / math.tau
-    last = ca.atan2(last_across, last_along) / math.tau
+    first = ca.atan2(first_across, first_along)
+    middle = ca.atan2(hypot(first_along, first_across), polar)
+    last = ca.atan2(last_across, last_along)
     # With the other sign, the outer joints turn by half a turn.
-    solutions = ((first, middle, last), (first + 0.5, -middle, last + 0.5))
+    solutions = ((first, middle, last), (first + math.pi, -middle, last + math.pi))
     are_inside = [
         reduce(ca.logic_and, map(limits.inside, joints, solution)) for solution in solutions
     ]
