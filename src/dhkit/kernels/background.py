@@ -28,10 +28,11 @@ class Background:
         self._work = work
         self._thread: threading.Thread | None = None
 
-    def count(self) -> None:
-        """Count a call."""
-        self.calls += 1
-        if self.calls % CALLS_BEFORE_COMPILING == 0:
+    def count(self, calls: int = 1) -> None:
+        """Count a call, or one that takes as long as so many."""
+        before = self.calls // CALLS_BEFORE_COMPILING
+        self.calls += calls
+        if self.calls // CALLS_BEFORE_COMPILING > before:
             self._start()
 
     def _start(self) -> None:

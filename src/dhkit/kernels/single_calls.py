@@ -89,6 +89,8 @@ class SingleCall:
     are_alike
         Tells of the function's and the kernel's outputs there, as flat arrays, whether the function may be used; by
         default whether they differ by rounding.
+    counts_as
+        Number of calls that one counts as, where the ordinary way takes long.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class SingleCall:
         refuses_nan: bool = False,
         example: Sequence[ArrayLike] | None = None,
         are_alike: Agreement | None = None,
+        counts_as: int = 1,
     ) -> None:
         self._kernel = kernel
         self._parameters = parameters
@@ -108,6 +111,7 @@ class SingleCall:
         self._refuses_nan = refuses_nan
         self._example = example
         self._are_alike = are_alike or _are_near
+        self._counts_as = counts_as
         self._background = Background(kernel.name, self._compile_in_thread)
 
     def __call__(self, *arguments: object) -> Any:
@@ -118,7 +122,7 @@ class SingleCall:
         if mode == "off":
             self._install(never)
             return None
-        self._background.count()
+        self._background.count(self._counts_as)
         return None
 
     def __repr__(self) -> str:

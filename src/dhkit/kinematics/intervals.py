@@ -17,7 +17,10 @@ from dhkit.kernels import pose_rows
 from dhkit.kinematics.candidates import are_poses
 from dhkit.kinematics.redundant import AtRedundancy, check_seven, values_to_try
 from dhkit.kinematics.root_intervals import intervals_by_roots
+from dhkit.kinematics.turn_parts import BEYOND, KNOWN
 
+_ANSWERED = (KNOWN, BEYOND)
+"""States of intervals by roots that have a meaning."""
 _STEP = np.pi / 360
 _ACCURACY = 1e-9
 """Steps in which intervals of the redundancy are looked for, and accuracy of their ends, rad."""
@@ -69,16 +72,19 @@ def redundancy_intervals(
     [(-0.684, 2.254)]
     """
     by_roots = intervals_by_roots(description) if limits else None
-    if by_roots is not None and (intervals := by_roots(T)) is not None:
-        return intervals
+    found = None if by_roots is None else by_roots(T)
+    if found is not None and found[0] in _ANSWERED:
+        return found[1]
     pose = pose_rows(T)
     if pose.ndim != 2:
         raise ValueError(f"T has shape {pose.shape}; expected (4, 4)")
     if not are_poses(pose):
         raise ValueError("T is not a pose; expected a finite position and an orthonormal rotation")
     check_seven(description)
-    if by_roots is not None and (intervals := by_roots.interpreted(pose)) is not None:
-        return intervals
+    if by_roots is not None and found is None:
+        state, intervals = by_roots.interpreted(pose)
+        if state in _ANSWERED:
+            return intervals
     solver = AtRedundancy.of(description)
 
     def is_reached(values: Array) -> NDArray[np.bool_]:

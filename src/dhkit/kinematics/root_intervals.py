@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ARM_ANGLE, Fit
 from dhkit.kinematics.turn_parts import (
     ARM_ANGLE_PARTS,
-    BEYOND,
     JOINT_7_PARTS,
     JOINTS,
     KNOWN,
@@ -27,6 +27,10 @@ from dhkit.kinematics.turn_parts import (
 )
 from dhkit.symbolic import Pipeline
 
+Intervals: TypeAlias = list[tuple[float, float]]
+"""Beginning and end of each interval, rad."""
+_COUNTS_AS = 20
+"""Calls that an interpreted one counts as: it takes up to 20 ms, compiled 50 us."""
 _AGREEMENT = 1e-5
 """Largest difference of compiled from interpreted ends, rad: roots amplify rounding where two nearly coincide."""
 
@@ -48,10 +52,9 @@ def intervals_by_roots(description: Description) -> IntervalsByRoots | None:
 
 
 class IntervalsByRoots:
-    """The intervals of an arm at poses, inside its limits.
+    """The intervals of an arm at poses, inside its limits, and the state that tells whether they have a meaning.
 
-    Its answers are None where it cannot tell: of other types than arrays, while it is not compiled, of matrices that
-    are no poses, and in the state ``UNKNOWN``, see :mod:`dhkit.kinematics.turn_parts`.
+    See :mod:`dhkit.kinematics.turn_parts` for the states.
     """
 
     def __init__(self, description: Description, fit: Fit, *, is_arm_angle: bool) -> None:
@@ -89,6 +92,7 @@ class IntervalsByRoots:
             install=self._install,
             example=[world_to_tool(description, posture)],
             are_alike=self._are_alike,
+            counts_as=_COUNTS_AS,
         )
 
     def _install(self, call: FastCall) -> None:
@@ -100,8 +104,6 @@ class IntervalsByRoots:
             self._intervals(begins.ravel().tolist(), are_inside.ravel().tolist(), state.item())
             for begins, are_inside, state in (found, expected)
         )
-        if one is None or other is None:
-            return one is other
         return np.shape(one) == np.shape(other) and np.allclose(one, other, rtol=0, atol=_AGREEMENT)
 
     def compile(self) -> None:
@@ -109,27 +111,30 @@ class IntervalsByRoots:
         if isinstance(self._call, SingleCall):
             self._call.compile()
 
-    def __call__(self, T: object) -> list[tuple[float, float]] | None:
-        """Return the intervals at a pose of the tool in the world, an array (4, 4), m, by compiled code."""
+    def __call__(self, T: object) -> tuple[float, Intervals] | None:
+        """Return state and intervals at a pose of the tool in the world, m, by compiled code.
+
+        None while it is not compiled, and of what is no array (4, 4) of finite numbers.
+        """
         found = self._call(T, None)
         if found is None:
             return None
         begins, packed = found
         *are_inside, state = self._packed.unpack(packed)
-        return self._intervals(begins.tolist(), are_inside, state)
+        # NaN where an entry of T is not finite.
+        return (
+            None if state != state else (state, self._intervals(begins.tolist(), are_inside, state))
+        )
 
-    def interpreted(self, T: Array) -> list[tuple[float, float]] | None:
-        """Return the intervals at a pose, shape (4, 4), m."""
+    def interpreted(self, T: Array) -> tuple[float, Intervals]:
+        """Return state and intervals at a pose, shape (4, 4), m."""
         begins, are_inside, state = (np.empty((1, size)) for size in (self._parts, self._parts, 1))
         self._kernel(self._parameters, [T.reshape(1, 16)], [begins, are_inside, state])
-        return self._intervals(begins[0].tolist(), are_inside[0].tolist(), state.item())
+        known = state.item()
+        return known, self._intervals(begins[0].tolist(), are_inside[0].tolist(), known)
 
-    def _intervals(
-        self, begins: list[float], are_inside: list[float], state: float
-    ) -> list[tuple[float, float]] | None:
-        if state == BEYOND:
-            return []
+    def _intervals(self, begins: list[float], are_inside: list[float], state: float) -> Intervals:
         if state != KNOWN:
-            return None
+            return []
         intervals = joined(begins, are_inside)
         return intervals if self._limits is None else unrolled(intervals, *self._limits)
