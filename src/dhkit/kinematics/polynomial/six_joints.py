@@ -108,11 +108,16 @@ class SixJoints:
     ) -> Found:
         """Return what is found, with the solutions of poses ``rows`` (M,) by another elimination added."""
         others = solve(self.description, way, poses[rows])
+        before = found.counts[rows]
         merged = _with(found, rows, others.q, others.owner)
         # Where that one is complete, and its solutions lie at its roots, it knows their number.
         is_known = others.is_complete & others.is_settled
         merged.expected[rows[is_known]] = others.expected[is_known]
         merged.is_exact[rows[is_known]] = True
+        # So do two ways whose roots nearly coincide, but which found the same solutions.
+        counts = merged.counts[rows]
+        is_same = others.is_exact & (before == counts) & (others.counts == counts)
+        merged.is_settled[rows[is_known | is_same]] = True
         return merged
 
     def _from_beside(self, poses: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -223,4 +228,5 @@ def _with(found: Found, rows: NDArray[np.intp], more: Array, owner: NDArray[np.i
         expected=found.expected.copy(),
         is_exact=found.is_exact.copy(),
         is_delicate=is_delicate,
+        is_settled=found.is_settled.copy(),
     )

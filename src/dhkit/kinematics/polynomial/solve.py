@@ -81,18 +81,21 @@ class Found:
     is_delicate: NDArray[np.bool_]
     """Whether a solution may be singular, shape (N,): two roots nearly coincide, or a solution is not at its root."""
     is_settled: NDArray[np.bool_]
-    """Whether each real root has a solution from which iteration moved it but little, shape (N,)."""
+    """Whether each real root has a solution from which iteration moved it but little, or two eliminations found the
+    same solutions, shape (N,)."""
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:
         """Whether a pose has as many solutions as its polynomial has real roots, shape (N,).
 
         Their number is even and at most 16, for complex ones come in pairs: of an odd number one is missing, or two
-        coincide.
+        coincide. Where roots nearly coincide, their number is known if solutions are at them: rounding makes complex
+        roots of some of four that coincide.
         """
         counts = self.counts
         is_possible = (counts % 2 == 0) & (counts <= MOST)
-        complete: NDArray[np.bool_] = self.is_exact & (counts >= self.expected) & is_possible
+        is_counted = self.is_exact & (self.is_settled | ~self.is_delicate)
+        complete: NDArray[np.bool_] = is_counted & (counts >= self.expected) & is_possible
         return complete
 
     @property
