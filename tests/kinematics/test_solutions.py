@@ -353,3 +353,26 @@ def test_distance_is_that_to_the_nearest_point_reached():
     for step, status in ((0.999, "out_of_reach"), (1.001, "ok")):
         T[0, 3] = 0.32 + step * distance
         assert arm.ik(T).status == status or (step > 1 and arm.ik(T).status == "singular")
+
+
+@pytest.mark.parametrize("name", ["puma560", "kr5", "panda"])
+def test_angles_at_the_edge_of_the_limits_slack_keep_their_turn(name):
+    """A flag that says inside, and whole turns whose rounding said outside, had put joints a turn away."""
+    arm = Arm.load(name)
+    numbers = arm.description.numbers
+    rng = np.random.default_rng(21)
+    checked = 0
+    for _ in range(300):
+        q = rng.uniform(numbers.lower, numbers.upper)
+        joint = rng.integers(arm.n - 1)
+        side = (numbers.lower, numbers.upper)[rng.integers(2)]
+        q[joint] = side[joint] + rng.choice([-1.0, 1.0]) * 1e-9 * (1 + rng.uniform(-1e-6, 1e-6))
+        seed = q if arm.n == 7 else None
+        found = arm.ik(arm.fk(q), seed=seed)
+        inside = found.within_limits()[found.allowed]
+        checked += len(inside)
+        assert (inside >= numbers.lower - 1.01e-9).all()
+        assert (inside <= numbers.upper + 1.01e-9).all()
+        for branch in np.array(found.branches)[found.allowed]:
+            assert found.windings(branch)
+    assert checked > 300

@@ -214,9 +214,7 @@ def _solved_with_care(description: Description, poses: Array) -> IKSolutions:
     rows = np.flatnonzero(posed)
     table = ordered(found.q, rows[found.owner], posed.size)
     B = table.shape[1]
-    is_delicate = np.zeros(posed.size, dtype=bool)
-    is_delicate[rows] = found.is_delicate
-    flags, is_nearly_curve = _singular_flags(description, table, is_delicate)
+    flags, is_nearly_curve = _singular_flags(description, table)
     are_false = is_nearly_curve | _have_clusters(table, flags)
     is_known = found.is_complete & ~are_false[rows]
     none_exist = np.zeros(posed.size, dtype=bool)
@@ -259,17 +257,14 @@ def elimination_kernels(description: Description) -> list[Kernel]:
 
 
 def _singular_flags(
-    description: Description, q: Array, is_delicate: NDArray[np.bool_]
+    description: Description, q: Array
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Return the flags of singular solutions (N, B, n) of delicate poses (N,), shape (N, B), and nearly curves, (N,).
+    """Return the flags of singular solutions (N, B, n), shape (N, B), and which poses are nearly curves, (N,).
 
     Near a curve of solutions, iteration closes at points beside it: two of them or more are nearly exactly singular.
     """
     flags = np.zeros(q.shape[:2], dtype=np.uint8)
-    is_nearly_curve = np.zeros(len(q), dtype=bool)
-    if not is_delicate.any():
-        return flags, is_nearly_curve
-    is_asked = is_delicate[:, None] & ~np.isnan(q).any(axis=-1)
+    is_asked = ~np.isnan(q).any(axis=-1)
     J = jacobian(description, q[is_asked])
     # Without units: velocities over the reach.
     J[:, :3] /= Axes.of(description).scale

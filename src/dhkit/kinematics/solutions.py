@@ -19,6 +19,8 @@ from dhkit.errors import UnreachableError
 
 LIMIT_SLACK = 1e-9
 """rad or m: how far outside its limits a joint still counts as inside, for rounding."""
+_SLACK = LIMIT_SLACK * 1.001
+"""The same for whole turns that are added to angles that count as inside: more, for their own rounding."""
 _FIRST = 5
 """Poses of a batch that a notebook shows."""
 
@@ -481,8 +483,8 @@ class IKSolutions:
             )
 
         # All whole k with lower <= value + 2 pi k <= upper.
-        first = int(np.ceil((lower - LIMIT_SLACK - value) / math.tau))
-        last = int(np.floor((upper + LIMIT_SLACK - value) / math.tau))
+        first = int(np.ceil((lower - _SLACK - value) / math.tau))
+        last = int(np.floor((upper + _SLACK - value) / math.tau))
         return [value + math.tau * k for k in range(first, last + 1)]
 
     def _reason(self, place: tuple[int, ...], count: int) -> str:
@@ -525,9 +527,14 @@ def wound(q: Array, near: Array, lower: Array, upper: Array, prismatic: NDArray[
     # q + 2 pi k with k the whole number nearest to (near - q) / (2 pi), and lower <= q + 2 pi k <= upper.
     with np.errstate(invalid="ignore"):
         turns = np.rint((near - q) / math.tau)
-        first = np.ceil((lower - LIMIT_SLACK - q) / math.tau)
-        last = np.floor((upper + LIMIT_SLACK - q) / math.tau)
+        first = np.ceil((lower - _SLACK - q) / math.tau)
+        last = np.floor((upper + _SLACK - q) / math.tau)
         turns = np.clip(turns, first, last)
+        # Where no turn leads inside, that of the smallest excess: the last is then one less than the first.
+        is_outside = first > last
+        excess = q + math.tau * first - upper
+        lack = lower - (q + math.tau * last)
+        turns = np.where(is_outside & (excess < lack), first, turns)
     return q + math.tau * np.where(prismatic | ~np.isfinite(turns), 0.0, turns)
 
 
