@@ -13,7 +13,7 @@ from arms_without_closed_form import GENERAL, LEFT, RIGHT, SIX
 from dhkit import Arm
 from dhkit.description import from_dh, pose, with_base, with_tool
 from dhkit.errors import ModelError
-from dhkit.kinematics import classify, inverse_kinematics, solve_numerically
+from dhkit.kinematics import IKFlag, classify, inverse_kinematics, solve_numerically
 from dhkit.kinematics.eliminated import (
     _solved_with_care,
     _SurePoses,
@@ -605,3 +605,54 @@ def test_the_order_does_not_depend_on_the_side_of_pi(name):
         if alone is not None:
             batch = solve_by_elimination(arm.description, T)
             assert np.abs(np.sin((alone.q - batch.q) / 2)).max() < 1e-7
+
+
+SPHERICAL = [
+    [(0, 0, 0.4, 0), (0, 0.6, 0, "pi/2"), (0, 0.2, 0.3, 1.0), (0, 0.8, 0, "-pi/2")],
+    [(0, 0, 0.4, "pi"), (0, 0, 0, "pi/2"), (0, 0.7, 0.2, 0), (0, 0.4, 0, "pi/2")],
+    [(0, 0, 0.4, 0), (0, 0.6, 0, "pi/3"), (0, 0, 0.3, "pi"), (0, 0.8, 0, "-pi/2")],
+]
+"""First rows of arms with a spherical wrist and no closed form; axes 1 and 2 of the last two are parallel."""
+
+
+@pytest.mark.parametrize("rows", SPHERICAL)
+def test_arms_with_multiple_roots_miss_nothing_that_they_call_complete(rows, law):
+    """Solutions share joints 1 to 3 in pairs, or joint 1 in fours: roots of the polynomial coincide."""
+    arm = Arm.from_dh([*rows, (0, 0, 0, "pi/2"), (0, 0.1, 0, 0)])
+    q = np.random.default_rng(6).uniform(-3, 3, (law.samples(400, 15), 6))
+    T = arm.fk(q)
+    batch = arm.ik(T)
+    missed = 0
+    for k, pose in enumerate(T):
+        one = arm.ik(pose)
+        missed += bool(_away(one, q[k]) > 1e-5 and one.complete)
+        count = int(one.valid.sum())
+        assert count == batch.valid[k].sum()
+        assert np.allclose(one.q[:count], batch.q[k, :count], rtol=0, atol=1e-6)
+    law.holds("solutions missed where complete", missed, 0)
+
+
+def _away(found, q):
+    """Return how far the nearest solution of a pose is from joint values, rad."""
+    return np.abs(np.angle(np.exp(1j * (found.q - q)))).max(axis=-1).min()
+
+
+def test_singular_solutions_have_their_flag_at_any_root():
+    """Four of eight, at roots that are far apart."""
+    rows = [
+        (0, 0.16, 0, "pi/2"),
+        (0, 0, -0.61, 0),
+        (0, 0, -0.57, 0),
+        (0, 0.17, 0.05, "pi/2"),
+        (0, 0.12, 0.03, "-pi/2"),
+        (0, 0.11, 0, 0),
+    ]
+    arm = Arm.from_dh(rows)
+    q = [-2.208612363282847, -3.9183568243111213, -2.504056704437348]
+    q += [1.407596291292775, -2.9668227854754523, 0.8642642704441499]
+    found = arm.ik(arm.fk(q))
+    J = arm.jacobian(found.q)
+    J[:, :3] /= arm.description.reach
+    is_singular = np.linalg.svd(J, compute_uv=False)[:, -1] < 1e-5
+    assert is_singular.sum() == 4 and str(found.status) == "singular"
+    assert np.array_equal(found.flags & IKFlag.singular > 0, is_singular)

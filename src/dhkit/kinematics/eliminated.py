@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.pose_results import PoseProgram, output_sizes
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import INEXACT, SAME_ANGLE, are_distinct
+from dhkit.kinematics.polynomial.solve import INEXACT, SAME_ANGLE, SORTED_BY, are_distinct
 from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, NEAR_SOLUTION, NONE, ROOTS
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
@@ -62,11 +62,11 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
     -------
     IKSolutions
         Branches ``"solution 1"`` ... ``"solution B"``, B the largest number found for a pose of the batch and at least
-        1. They are ordered by their joint values, the first joint's first: the same number at another pose need not
-        be the same way to reach. Singular ones have the flag ``singular``. ``complete`` tells whether each pose has as
-        many solutions as its polynomial has real roots; it is False for arms that never move in all directions, whose
-        solutions are curves. A pose that has none of either is ``out_of_reach``, other poses without a solution are
-        ``not_found``. ``distance`` is NaN where nothing was found.
+        1. They are in ascending order of joint 1, and where it is equal of q2 + q3/10 + q4/100 + q5/1000: the same
+        number at another pose need not be the same way to reach. Singular ones have the flag ``singular``. ``complete``
+        tells whether each pose has as many solutions as its polynomial has real roots; it is False for arms that never
+        move in all directions, whose solutions are curves. A pose that has none of either is ``out_of_reach``, other
+        poses without a solution are ``not_found``. ``distance`` is NaN where nothing was found.
 
     Raises
     ------
@@ -321,11 +321,12 @@ def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
         Number of poses.
     """
     counts = np.bincount(owner, minlength=poses)
-    # Angles are rounded, and those of joints 2 and 3 count where the ones before are equal.
-    # Angles at -pi are those at pi.
-    around = np.where(q[:, :3] < SAME_ANGLE - np.pi, q[:, :3] + 2 * np.pi, q[:, :3])
-    q_1, q_2, q_3 = np.rint(around.T / SAME_ANGLE) * SAME_ANGLE
-    by_joints = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
+    # Angles are rounded, and those of further joints count where joint 1 is equal: both flips of a spherical wrist
+    # share joints 1 to 3. Angles at -pi are those at pi.
+    some = q[:, :SORTED_BY]
+    around = np.where(some < SAME_ANGLE - np.pi, some + 2 * np.pi, some)
+    first, *others = np.rint(around.T / SAME_ANGLE) * SAME_ANGLE
+    by_joints = first + SAME_ANGLE * reduce(lambda sum_, x: 0.1 * (x + sum_), others[::-1], 0.0)
     place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
     shape = (poses, max(1, int(counts.max(initial=0))))
     keys = np.full(shape, np.inf)

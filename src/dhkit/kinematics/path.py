@@ -29,6 +29,11 @@ _MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
 _RESTARTS_AFTER_LOST = 7
 """Number of restarts of the search for a pose that comes after a lost one."""
+_STAYING = 0.1
+"""Factor of the squared step of the branch before: another one is taken if its step is less than a third of that.
+
+Next to a singularity two branches nearly coincide; a closed path would not close if it left one for the other there.
+"""
 _CHUNK = 4096
 """Poses whose branches are compared together, some 15 MB."""
 _WHOLE = 6
@@ -118,7 +123,8 @@ def follow_path(
     """Follow one branch along a path of poses.
 
     At the first pose the branch nearest to ``q0`` is taken, then at each pose the solution nearest to the last one,
-    whole turns added. Nearest means the least sum of squared joint differences.
+    whole turns added. Nearest means the least sum of squared joint differences; another branch must be nearer than a
+    third of the distance of the same one.
 
     Parameters
     ----------
@@ -193,7 +199,9 @@ def _followed_by_branches(
     at_singularity = solutions.flags & (IKFlag.wrist | IKFlag.shoulder) != 0
     has_free_joint = np.asarray(at_singularity.any(axis=-1))
     is_usable = np.asarray(usable.any(axis=-1))
-    near = _NearestBranch.of(solutions, usable, q0, limits)
+    found = classify(description)
+    has_names = found.family is not None or found.redundant is not None
+    near = _NearestBranch.of(solutions, usable, q0, limits, has_names)
     motion: Motion = "whole" if len(solutions.met) == 6 else "translational"
     if len(poses) and is_usable.all() and not has_free_joint.any():
         chain = near.chained(q0)
@@ -204,18 +212,20 @@ def _followed_by_branches(
     q = np.full((len(poses), description.n), np.nan)
     branch = [""] * len(poses)
     at = q0
+    last: int | None = None
     for k in range(len(poses)):
         if has_free_joint[k] and redundancy is None:
             # Where the wrist is straight, or its centre on axis 1, one joint is free and keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
             allowed = here.allowed if limits else here.valid
-            chosen = _nearest_branch(here.q, allowed, at, solutions, limits)
+            chosen = near.of_one(here.q, allowed, at, last)
         else:
-            chosen = near(k, at) if is_usable[k] else None
+            chosen = near(k, at, last) if is_usable[k] else None
+        last = None
         if chosen is not None:
-            place, at = chosen
+            last, at = chosen
             q[k] = at
-            branch[k] = solutions.branches[place]
+            branch[k] = solutions.branches[last]
     return _path_of(description, q, branch, q0, motion)
 
 
@@ -300,6 +310,8 @@ class _NearestBranch:
     """2 pi for joints of which every whole turn, or several, are allowed, 0 for others, shape (n,), rad and m."""
     has_several: bool
     """Whether a joint has several whole turns inside its limits, of which the last pose decides."""
+    has_names: bool
+    """Whether a branch is the same at all poses; solutions by elimination are only numbered."""
 
     @cached_property
     def has_turns(self) -> bool:
@@ -308,7 +320,12 @@ class _NearestBranch:
 
     @classmethod
     def of(
-        cls, solutions: IKSolutions, usable: NDArray[np.bool_], q0: Array, limits: bool
+        cls,
+        solutions: IKSolutions,
+        usable: NDArray[np.bool_],
+        q0: Array,
+        limits: bool,
+        has_names: bool,
     ) -> _NearestBranch:
         """Return the branches of a path; ``q0`` are any joint values, shape (n,)."""
         width = solutions.upper - solutions.lower
@@ -318,7 +335,7 @@ class _NearestBranch:
         turn = np.where(is_endless | is_several, math.tau, 0.0)
         wound = solutions.wound(solutions.q, q0, limits=limits)
         q = np.where(usable[..., None], wound, 0.0)
-        return cls(solutions, usable, limits, q, turn, bool(is_several.any()))
+        return cls(solutions, usable, limits, q, turn, bool(is_several.any()), has_names)
 
     def chained(self, at: Array) -> tuple[Array, list[int]] | None:
         """Return joint values (N, n) and branches of a path whose poses all have some, each nearest to the one before.
@@ -340,6 +357,9 @@ class _NearestBranch:
             if self.has_turns:
                 steps -= self.turn * np.rint(steps / math.tau)
             squares = np.einsum("kabn,kabn->kab", steps, steps)
+            if self.has_names:
+                each = np.arange(squares.shape[1])
+                squares[:, each, each] *= _STAYING
             is_usable = self.usable[begin + 1 : begin + 1 + len(steps), None]
             following = np.where(is_usable, squares, np.inf).argmin(axis=-1)
             for nearest in following.tolist():
@@ -355,30 +375,35 @@ class _NearestBranch:
                 return None
         return chosen, places
 
-    def __call__(self, k: int, at: Array) -> tuple[int, Array] | None:
-        """Return the branch of pose k that is nearest to joint values (n,), and its joint values."""
+    def __call__(self, k: int, at: Array, last: int | None = None) -> tuple[int, Array] | None:
+        """Return the branch of pose k that is nearest to joint values (n,), and its joint values.
+
+        ``last`` is the branch of the pose before, None if there is none.
+        """
         if self.has_several:
-            return _nearest_branch(
-                self.solutions.q[k], self.usable[k], at, self.solutions, self.limits
-            )
+            return self.of_one(self.solutions.q[k], self.usable[k], at, last)
         step = self.q[k] - at
         if self.has_turns:
             step -= self.turn * np.rint(step / math.tau)
         squares = np.einsum("bn,bn->b", step, step)
+        if last is not None and self.has_names:
+            squares[last] *= _STAYING
         best = int(np.where(self.usable[k], squares, np.inf).argmin())
         return best, at + step[best]
 
-
-def _nearest_branch(
-    candidates: Array, allowed: NDArray[np.bool_], at: Array, solutions: IKSolutions, limits: bool
-) -> tuple[int, Array] | None:
-    """Return the branch nearest to the last joint positions, and its positions with whole turns added; None if none."""
-    if not allowed.any():
-        return None
-    wound = solutions.wound(candidates, at, limits=limits)
-    gaps = np.where(allowed, np.sum((wound - at) ** 2, axis=-1), np.inf)
-    best = int(np.argmin(np.where(np.isnan(gaps), np.inf, gaps)))
-    return best, wound[best]
+    def of_one(
+        self, candidates: Array, allowed: NDArray[np.bool_], at: Array, last: int | None
+    ) -> tuple[int, Array] | None:
+        """Return the same of the solutions (B, n) of one pose, of which some (B,) are allowed; None if none is."""
+        if not allowed.any():
+            return None
+        wound = self.solutions.wound(candidates, at, limits=self.limits)
+        gaps = np.where(allowed, np.sum((wound - at) ** 2, axis=-1), np.inf)
+        gaps = np.where(np.isnan(gaps), np.inf, gaps)
+        if last is not None and self.has_names:
+            gaps[last] *= _STAYING
+        best = int(np.argmin(gaps))
+        return best, wound[best]
 
 
 def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[int, ...]:

@@ -27,7 +27,7 @@ _REACHED = (int(IKStatus.ok), int(IKStatus.singular))
 class PoseCall:
     """All solutions of one pose or a few of an arm with a closed form, or None of what it does not take."""
 
-    def __init__(self, description: Description, solver: Solver) -> None:
+    def __init__(self, description: Description, solver: Solver, free: int = 2) -> None:
         self.shared: Mapping[str, object] = {
             "branches": solver.fit.branches,
             "met": solver.fit.coordinates,
@@ -45,7 +45,7 @@ class PoseCall:
             solver.parameters,
             (B, description.n),
             install=self._install,
-            example=[world_to_tool(description, middle), _NO_SEED, _NO_SEED],
+            example=[world_to_tool(description, middle), *[_NO_SEED] * free],
         )
 
     def _install(self, call: FastCall) -> None:
@@ -97,7 +97,7 @@ class RedundantCall:
     """The solutions of one pose of an arm of seven joints at a redundancy, or None of what it does not take."""
 
     def __init__(self, description: Description, solver: Solver) -> None:
-        self._poses = PoseCall(description, solver)
+        self._poses = PoseCall(description, solver, free=3)
 
     def compile(self) -> None:
         """Compile the function now."""
@@ -114,7 +114,7 @@ class RedundantCall:
             The redundancy, rad; a float is taken.
         """
         poses = self._poses
-        found = poses.call(T, _NO_SEED, redundancy, None)
+        found = poses.call(T, _NO_SEED, redundancy, _NO_SEED, None)
         if found is None:
             return None
         q, packed = found

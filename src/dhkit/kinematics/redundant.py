@@ -74,7 +74,8 @@ def solve_redundant(
     T
         Poses of the tool in the world, shape (..., 4, 4).
     seed
-        Joint positions, shape (7,) or (..., 7), rad, whose redundancy is taken if ``redundancy`` is not given.
+        Joint positions, shape (7,) or (..., 7), rad, whose redundancy is taken if ``redundancy`` is not given, and from
+        which joints 1 and 5 take their angles where a singularity leaves them free.
     redundancy
         Joint position 7, or the arm angle, shape () or (...), rad. If neither is given, 33 values are tried, of joint 7
         from the middle of its limits outward, of the arm angle from 0 to both sides. Each pose has the first one with a
@@ -105,7 +106,8 @@ def solve_redundant(
         return solver(T, values, threads, out)
     asked_for = _asked_for(description, seed, redundancy, T.shape[:-2])
     if asked_for is not None:
-        return solver(T, asked_for, threads, out)
+        joints = None if seed is None else joint_array(description, seed, "seed")
+        return solver(T, asked_for, threads, out, joints)
     found = _at_tried_values(solver, T, threads)
     return found if out is None else solver(T, np.asarray(found.redundancy), threads, out)
 
@@ -188,12 +190,25 @@ class AtRedundancy:
         return cls(description, lock(description, {_LAST: 0}))
 
     def __call__(
-        self, T: Array, values: Array, threads: int = 1, out: Array | None = None
+        self,
+        T: Array,
+        values: Array,
+        threads: int = 1,
+        out: Array | None = None,
+        seed: Array | None = None,
     ) -> IKSolutions:
-        """Return the solutions of poses (..., 4, 4) at redundancies (...), rad; ``out`` is for closed forms."""
+        """Return the solutions of poses (..., 4, 4) at redundancies (...), rad; ``out`` is for closed forms.
+
+        Joints 1 and 5 have the angles of ``seed``, shape (7,) or (..., 7), rad, or 0, where a singularity leaves them
+        free.
+        """
         if isinstance(self.method, Description):
             return self._by_elimination(self.method, T, values)
-        free = np.stack([np.zeros(values.shape), values])
+        free = np.zeros((3, *values.shape))
+        free[1] = values
+        if seed is not None:
+            free[0] = seed[..., 0]
+            free[2] = seed[..., 4]
         found = solve_in_closed_form(self.description, self.method, T, free, out, threads)
         status = found.status_code
         is_missed = status == IKStatus.out_of_reach

@@ -65,8 +65,8 @@ class IKFlag(IntFlag):
 class IKSolutions:
     """All solutions of a batch of poses, in B branches.
 
-    In closed form the branches are the same for every pose, in a fixed order. By elimination they are the solutions in
-    ascending order of their joint values, and B is the largest number of them at a pose of the batch.
+    In closed form the branches are the same for every pose, in a fixed order. By elimination they are the solutions,
+    sorted by joint 1 and then by the others, and B is the largest number of them at a pose of the batch.
 
     Rows of branches that do not reach the pose are NaN. Angles are in (-pi, pi].
     """

@@ -70,7 +70,8 @@ def solve_in_closed_form(
     poses
         Poses of the tool in the world, shape (..., 4, 4), m.
     free
-        Angles of the two joints that may be free, shape (2, ...), rad: see :func:`free_angles`.
+        Angles of the joints that may be free, shape (2, ...), rad: see :func:`free_angles`; of seven joints those of
+        joint 1, the redundancy, and joint 5, shape (3, ...).
     out, threads
         As for :func:`dhkit.kinematics.inverse_kinematics`.
     """
@@ -95,7 +96,7 @@ def solve_in_closed_form(
             status.reshape(count, 1),
         ]
         # Kernels read arrays without gaps; those that broadcasting made have none of their own.
-        columns = (poses.reshape(count, 16), *free.reshape(2, count, 1))
+        columns = (poses.reshape(count, 16), *free.reshape(len(free), count, 1))
         inputs = [np.ascontiguousarray(column) for column in columns]
         solver.kernel(solver.parameters, inputs, rows, threads)
         # A single call has no time to look for others.

@@ -73,11 +73,15 @@ def arm_angle_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         elbow = arm.elbow
         x_3, _, z_3 = arm.shoulder
         x_7, _, z_7 = arm.wrist
+        free_1 = add_angles(pose.free_1, p["offset1"])
+        free_5 = add_angles(pose.free_5, p["offset5"])
         for side in SIGNS:
-            wrist, wrist_is_singular = three_joints(z_7, x_7, (p["alpha5"], p["alpha6"]), side)
+            wrist, wrist_is_singular = three_joints(
+                z_7, x_7, (p["alpha5"], p["alpha6"]), side, free_5
+            )
             for tilt in SIGNS:
                 first, shoulder_is_singular = three_joints(
-                    z_3, x_3, (p["alpha1"], p["alpha2"]), tilt, pose.free_1
+                    z_3, x_3, (p["alpha1"], p["alpha2"]), tilt, free_1
                 )
                 joints = [
                     angle(add_angles(theta, p[f"offset{i}"], -1.0))

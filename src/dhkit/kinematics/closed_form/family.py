@@ -98,6 +98,11 @@ class Family:
     redundancy: str = ""
     """What is given besides the pose, for seven joints: ``LAST_JOINT`` or ``ARM_ANGLE``; it is ``PoseSymbols.free``."""
 
+    @property
+    def free_angles(self) -> tuple[str, ...]:
+        """Names of the angles in :class:`PoseSymbols` that are given besides the pose."""
+        return ("free_1", "free", "free_5") if self.redundancy else ("free_1", "free")
+
 
 @dataclass(frozen=True)
 class FramedPose:
@@ -121,6 +126,8 @@ class PoseSymbols:
     """Angle of the free joint at a wrist singularity, or the redundancy of seven joints, as a pair."""
     free_1: Pair = (1.0, 0.0)
     """Angle of joint 1 where the point that it turns is on its axis, as a pair."""
+    free_5: Pair = (1.0, 0.0)
+    """Angle of joint 5 of seven where axes 5 and 7 coincide, as a pair."""
     noise: SX = 0.0
     """Largest entry of R^T R - 1, which tells how exactly the pose is known."""
 

@@ -19,20 +19,19 @@ from dhkit.symbolic import Graph
 
 
 def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
-    """Return the program of a family: T (4 x 4), ``free_1`` and ``free`` to q, distance, valid, flags and status.
+    """Return the program of a family: T (4 x 4) and its free angles, rad, to q, distance, valid, flags and status.
 
-    The program's parameters are ``fit.vector()`` followed by ``limit_parameters``. ``free_1`` and ``free`` are the
-    angles of :class:`PoseSymbols` of these names, rad.
+    The program's parameters are ``fit.vector()`` followed by ``limit_parameters``.
     """
     symbols = ca.SX.sym("p", len(fit.vector()))
     limits = ca.SX.sym("limits", 2 * len(prismatic))
     T = ca.SX.sym("T", 4, 4)
-    free = (ca.SX.sym("free_1"), ca.SX.sym("free"))
+    free = {name: ca.SX.sym(name) for name in family.free_angles}
     return Graph.of(
         "inverse_kinematics",
-        {"parameters": ca.vertcat(symbols, limits), "T": T, "free_1": free[0], "free": free[1]},
+        {"parameters": ca.vertcat(symbols, limits), "T": T, **free},
         _outputs(family, fit, prismatic, fit.named(symbols), limits, T, free),
-        {"free_1": (), "free": ()},
+        dict.fromkeys(free, ()),
         branches=len(fit.branches),
     )
 
@@ -40,15 +39,17 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
 def arm_program(family: Family, fit: Fit, prismatic: Sequence[bool], limits: Array) -> Graph:
     """Return the program with an arm's parameters and ``limits`` (2n,), rad and m, as constants.
 
-    Both free angles are one input of two entries.
+    The free angles are one input.
     """
     T = ca.SX.sym("T", 4, 4)
-    free = ca.SX.sym("free", 2)
+    names = family.free_angles
+    free = ca.SX.sym("free", len(names))
+    angles = dict(zip(names, ca.vertsplit(free), strict=True))
     named = fit.named(ca.SX(fit.vector()))
     return Graph.of(
         "inverse_kinematics",
         {"T": T, "free": free},
-        _outputs(family, fit, prismatic, named, ca.SX(limits), T, (free[0], free[1])),
+        _outputs(family, fit, prismatic, named, ca.SX(limits), T, angles),
     )
 
 
@@ -59,7 +60,7 @@ def _outputs(
     named: Mapping[str, SX],
     limits: ca.SX,
     T: ca.SX,
-    free: tuple[SX, SX],
+    free: Mapping[str, SX],
 ) -> dict[str, ca.SX]:
     """Return q, distance, valid, flags and status of all branches."""
     posed = is_pose(T)
@@ -68,8 +69,7 @@ def _outputs(
         T=T[:3, :],
         scale=scale,
         structure=fit.structure,
-        free_1=(ca.cos(free[0]), ca.sin(free[0])),
-        free=(ca.cos(free[1]), ca.sin(free[1])),
+        **{name: (ca.cos(angle), ca.sin(angle)) for name, angle in free.items()},
         noise=reduce(ca.fmax, map(ca.fabs, _defects(T))),
     )
     branches = family.formulas(named, pose)

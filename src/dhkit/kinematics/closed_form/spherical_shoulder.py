@@ -77,6 +77,7 @@ def spherical_shoulder_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[
     axes 5 and 6 (on the side of axis 5 x axis 6) or at its back, and q2 positive or negative.
     """
     link_6, centre, to_shoulder = at_joint_7(p, pose)
+    free_1 = add_angles(pose.free_1, p["offset1"])
     branches: list[Branch] = []
     for bend in SIGNS:
         elbow = elbow_bent(p, centre, bend, pose)
@@ -98,7 +99,7 @@ def spherical_shoulder_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[
             x_3 = in_world((1.0, 0.0, 0.0))
             for tilt in SIGNS:
                 first, is_singular = three_joints(
-                    z_3, x_3, (p["alpha1"], p["alpha2"]), tilt, pose.free_1
+                    z_3, x_3, (p["alpha1"], p["alpha2"]), tilt, free_1
                 )
                 thetas = (*first, elbow.theta_4, wrist.theta_5, wrist.theta_6)
                 joints = [

@@ -28,7 +28,7 @@ from dhkit.kinematics.polynomial.roots_program import (
     sizes_of,
     square_of_distance,
 )
-from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE
+from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE, SORTED_BY
 from dhkit.kinematics.polynomial.trigonometric import (
     DEGREE,
     DOUBTFUL,
@@ -349,9 +349,10 @@ def known_solutions(
     one = ca.if_else(closeness > 0.0, NEAR_SOLUTION, SOLUTION)
     kind = ca.if_else(is_tried != 0.0, ca.if_else(is_sure, one, DOUBTFUL), of_complex)
     # As dhkit.kinematics.eliminated.ordered has it. Angles at -pi are those at pi.
-    around = [ca.if_else(q[k] < SAME_ANGLE - math.pi, q[k] + math.tau, q[k]) for k in range(3)]
-    q_1, q_2, q_3 = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
-    order = q_1 + 0.1 * SAME_ANGLE * (q_2 + 0.1 * q_3)
+    some = ca.vertsplit(q[:SORTED_BY])
+    around = [ca.if_else(x < SAME_ANGLE - math.pi, x + math.tau, x) for x in some]
+    first, *further = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
+    order = first + SAME_ANGLE * reduce(lambda sum_, x: 0.1 * (x + sum_), further[::-1], ca.SX(0.0))
     # Finite even where q is NaN: the place at which a root is stored follows from it.
     order = ca.if_else(ca.fabs(order) < _BELOW_ALL, order, 0.0)
 

@@ -23,6 +23,8 @@ INEXACT = 1e-6
 """Largest coefficient beyond degree 8, relative to the others, of a polynomial that is trusted."""
 SAME_ANGLE = 1e-6
 """Angles that differ by less, rad, count as equal when solutions are sorted."""
+SORTED_BY = 5
+"""Number of joints by which solutions are sorted."""
 _SAME_SOLUTION = 1e-5
 """Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
 _NUMBERED = 3
