@@ -623,8 +623,8 @@ def test_arms_with_multiple_roots_miss_nothing_that_they_call_complete(rows, law
     T = arm.fk(q)
     batch = arm.ik(T)
     missed = 0
-    for k, pose in enumerate(T):
-        one = arm.ik(pose)
+    for k in range(len(T)):
+        one = arm.ik(T[k])
         missed += bool(_away(one, q[k]) > 1e-5 and one.complete)
         count = int(one.valid.sum())
         assert count == batch.valid[k].sum()
