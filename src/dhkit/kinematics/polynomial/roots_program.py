@@ -1,4 +1,8 @@
-"""Program from values of a trigonometric polynomial to its real roots: coefficients, Aberth's method, what is real."""
+"""Program from values of a trigonometric polynomial to its real roots: coefficients, Aberth's method, what is real.
+
+It solves a polynomial in each lane, for values that come in batches, such as determinants by LAPACK. Programs for one
+pose have a root in each lane, see :mod:`dhkit.kinematics.polynomial.pose_steps`.
+"""
 
 from __future__ import annotations
 
