@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from arms_without_closed_form import SEVEN
 from dhkit import Arm, pose
 from dhkit.description import from_dh, library_robot
 from dhkit.errors import ModelError, UnreachableError
@@ -249,3 +250,32 @@ def test_a_branch_that_does_not_reach_is_never_taken(name):
     jumping = arm.ik_path(arm.fk(q), q[0], limits=False)
     reached = np.setdiff1d(np.arange(len(q)), jumping.lost)
     assert np.abs(arm.fk(jumping.q[reached]) - arm.fk(q[reached])).max() < 1e-8
+
+
+ELBOWS = {"puma560": (2, np.pi / 2 + 0.0469), "ur5": (2, 0.0), "iiwa": (3, 0.0)}
+"""Joint of the elbow, counted from 0, and about where the arm is stretched, rad."""
+
+
+@pytest.mark.parametrize("name", ELBOWS)
+@pytest.mark.parametrize("passes", [True, False])
+def test_joint_motions_through_and_beside_the_stretched_elbow_are_followed(name, passes):
+    """Where two branches nearly coincide, the last step tells whether the path goes through or turns back."""
+    arm = SEVEN["KUKA iiwa 14"] if name == "iiwa" else Arm.load(name)
+    joint, straight = ELBOWS[name]
+    rng = np.random.default_rng(31)
+    deviating = 0
+    for _ in range(40):
+        count = int(rng.integers(60, 300))
+        start = rng.uniform(-1, 1, arm.n)
+        shares = np.linspace(0, 1, count)[:, None]
+        q = start + shares * rng.uniform(-0.5, 0.5, arm.n)
+        if passes:
+            q[:, joint] = straight + np.linspace(
+                -rng.uniform(0.1, 0.6), rng.uniform(0.1, 0.6), count
+            )
+        else:
+            q[:, joint] = straight - rng.uniform(0.01, 0.1) - (shares[:, 0] - 0.5) ** 2
+        redundancy = arm.redundancy(q) if arm.n == 7 else None
+        path = arm.ik_path(arm.fk(q), q[0], limits=False, redundancy=redundancy)
+        deviating += not path.ok or np.abs(path.q - q).max() > 1e-3
+    assert deviating <= 1

@@ -29,10 +29,10 @@ _MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
 _RESTARTS_AFTER_LOST = 7
 """Number of restarts of the search for a pose that comes after a lost one."""
-_STAYING = 0.1
-"""Factor of the squared step of the branch before: another one is taken if its step is less than a third of that.
+_ALIKE = 9.0
+"""Branches are told apart by the last step if their squared steps are at most so many times the least.
 
-Next to a singularity two branches nearly coincide; a closed path would not close if it left one for the other there.
+Next to a singularity two branches nearly coincide: the path goes through it to the other one, or stays in its own.
 """
 _CHUNK = 4096
 """Poses whose branches are compared together, some 15 MB."""
@@ -123,8 +123,8 @@ def follow_path(
     """Follow one branch along a path of poses.
 
     At the first pose the branch nearest to ``q0`` is taken, then at each pose the solution nearest to the last one,
-    whole turns added. Nearest means the least sum of squared joint differences; another branch must be nearer than a
-    third of the distance of the same one.
+    whole turns added. Nearest means the least sum of squared joint differences. Of solutions within three times the
+    least distance, as there are next to a singularity, the one nearest to where the last step leads is taken.
 
     Parameters
     ----------
@@ -199,9 +199,7 @@ def _followed_by_branches(
     at_singularity = solutions.flags & (IKFlag.wrist | IKFlag.shoulder) != 0
     has_free_joint = np.asarray(at_singularity.any(axis=-1))
     is_usable = np.asarray(usable.any(axis=-1))
-    found = classify(description)
-    has_names = found.family is not None or found.redundant is not None
-    near = _NearestBranch.of(solutions, usable, q0, limits, has_names)
+    near = _NearestBranch.of(solutions, usable, q0, limits)
     motion: Motion = "whole" if len(solutions.met) == 6 else "translational"
     if len(poses) and is_usable.all() and not has_free_joint.any():
         chain = near.chained(q0)
@@ -212,20 +210,21 @@ def _followed_by_branches(
     q = np.full((len(poses), description.n), np.nan)
     branch = [""] * len(poses)
     at = q0
-    last: int | None = None
+    before: Array | None = None
     for k in range(len(poses)):
         if has_free_joint[k] and redundancy is None:
             # Where the wrist is straight, or its centre on axis 1, one joint is free and keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
             allowed = here.allowed if limits else here.valid
-            chosen = near.of_one(here.q, allowed, at, last)
+            chosen = near.of_one(here.q, allowed, at, before)
         else:
-            chosen = near(k, at, last) if is_usable[k] else None
-        last = None
+            chosen = near(k, at, before) if is_usable[k] else None
+        # After a lost pose, and at the first one, no step leads anywhere.
+        before = at if chosen is not None and k and branch[k - 1] else None
         if chosen is not None:
-            last, at = chosen
+            place, at = chosen
             q[k] = at
-            branch[k] = solutions.branches[last]
+            branch[k] = solutions.branches[place]
     return _path_of(description, q, branch, q0, motion)
 
 
@@ -310,8 +309,6 @@ class _NearestBranch:
     """2 pi for joints of which every whole turn, or several, are allowed, 0 for others, shape (n,), rad and m."""
     has_several: bool
     """Whether a joint has several whole turns inside its limits, of which the last pose decides."""
-    has_names: bool
-    """Whether a branch is the same at all poses; solutions by elimination are only numbered."""
 
     @cached_property
     def has_turns(self) -> bool:
@@ -325,7 +322,6 @@ class _NearestBranch:
         usable: NDArray[np.bool_],
         q0: Array,
         limits: bool,
-        has_names: bool,
     ) -> _NearestBranch:
         """Return the branches of a path; ``q0`` are any joint values, shape (n,)."""
         width = solutions.upper - solutions.lower
@@ -335,12 +331,13 @@ class _NearestBranch:
         turn = np.where(is_endless | is_several, math.tau, 0.0)
         wound = solutions.wound(solutions.q, q0, limits=limits)
         q = np.where(usable[..., None], wound, 0.0)
-        return cls(solutions, usable, limits, q, turn, bool(is_several.any()), has_names)
+        return cls(solutions, usable, limits, q, turn, bool(is_several.any()))
 
     def chained(self, at: Array) -> tuple[Array, list[int]] | None:
         """Return joint values (N, n) and branches of a path whose poses all have some, each nearest to the one before.
 
-        None if whole turns would lead out of the limits: the poses must then be followed one by one.
+        None if whole turns would lead out of the limits, or two branches are nearly as near: the poses must then be
+        followed one by one.
 
         Parameters
         ----------
@@ -357,12 +354,14 @@ class _NearestBranch:
             if self.has_turns:
                 steps -= self.turn * np.rint(steps / math.tau)
             squares = np.einsum("kabn,kabn->kab", steps, steps)
-            if self.has_names:
-                each = np.arange(squares.shape[1])
-                squares[:, each, each] *= _STAYING
             is_usable = self.usable[begin + 1 : begin + 1 + len(steps), None]
-            following = np.where(is_usable, squares, np.inf).argmin(axis=-1)
-            for nearest in following.tolist():
+            squares = np.where(is_usable, squares, np.inf)
+            following = squares.argmin(axis=-1)
+            least = squares.min(axis=-1, keepdims=True)
+            is_open = np.count_nonzero(squares <= _ALIKE * least, axis=-1) > 1
+            for nearest, is_doubtful in zip(following.tolist(), is_open.tolist(), strict=True):
+                if is_doubtful[places[-1]]:
+                    return None
                 places.append(nearest[places[-1]])
         chosen = q[np.arange(len(q)), places]
         # Whole turns since the first pose, whose own are right.
@@ -375,35 +374,42 @@ class _NearestBranch:
                 return None
         return chosen, places
 
-    def __call__(self, k: int, at: Array, last: int | None = None) -> tuple[int, Array] | None:
+    def __call__(self, k: int, at: Array, before: Array | None = None) -> tuple[int, Array] | None:
         """Return the branch of pose k that is nearest to joint values (n,), and its joint values.
 
-        ``last`` is the branch of the pose before, None if there is none.
+        ``before`` are the joint values at the pose before those, shape (n,), or None.
         """
         if self.has_several:
-            return self.of_one(self.solutions.q[k], self.usable[k], at, last)
+            return self.of_one(self.solutions.q[k], self.usable[k], at, before)
         step = self.q[k] - at
         if self.has_turns:
             step -= self.turn * np.rint(step / math.tau)
-        squares = np.einsum("bn,bn->b", step, step)
-        if last is not None and self.has_names:
-            squares[last] *= _STAYING
-        best = int(np.where(self.usable[k], squares, np.inf).argmin())
+        step[~self.usable[k]] = np.nan
+        best = _likely(step, None if before is None else at - before)
         return best, at + step[best]
 
     def of_one(
-        self, candidates: Array, allowed: NDArray[np.bool_], at: Array, last: int | None
+        self, candidates: Array, allowed: NDArray[np.bool_], at: Array, before: Array | None
     ) -> tuple[int, Array] | None:
         """Return the same of the solutions (B, n) of one pose, of which some (B,) are allowed; None if none is."""
         if not allowed.any():
             return None
         wound = self.solutions.wound(candidates, at, limits=self.limits)
-        gaps = np.where(allowed, np.sum((wound - at) ** 2, axis=-1), np.inf)
-        gaps = np.where(np.isnan(gaps), np.inf, gaps)
-        if last is not None and self.has_names:
-            gaps[last] *= _STAYING
-        best = int(np.argmin(gaps))
+        step = np.where(allowed[:, None], wound - at, np.nan)
+        best = _likely(step, None if before is None else at - before)
         return best, wound[best]
+
+
+def _likely(steps: Array, last: Array | None) -> int:
+    """Return which of the steps (B, n), some of them NaN, continues a path whose last step is (n,), or None."""
+    squares = np.einsum("bn,bn->b", steps, steps)
+    least = np.nanmin(squares)
+    if last is None:
+        return int(np.nanargmin(squares))
+    changes = steps - last
+    differences = np.einsum("bn,bn->b", changes, changes)
+    # Comparisons with NaN are false.
+    return int(np.where(squares <= _ALIKE * least, differences, np.inf).argmin())
 
 
 def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[int, ...]:
