@@ -35,8 +35,8 @@ def redundancy_intervals(
     """Return the intervals of the redundancy in which an arm of seven joints reaches a pose.
 
     Of an arm with a closed form at a given redundancy their ends are roots of equations. Those of an arm angle are
-    known to rounding, those of joint 7 to 1e-9 rad, or 1e-5 rad where two roots nearly coincide. An interval narrower
-    than 3e-6 rad may be missing.
+    known to rounding, those of joint 7 to 1e-9 rad (99 of 100), or 1e-4 rad where roots nearly coincide. An interval
+    narrower than 3e-6 rad may be missing.
 
     For other arms, and without limits, the redundancy is tried at steps of half a degree, and the ends are found to
     1e-9 rad: an interval that is narrower than a step may be missing. So is an arm angle where the arm is stretched

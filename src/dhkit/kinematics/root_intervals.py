@@ -31,7 +31,7 @@ Intervals: TypeAlias = list[tuple[float, float]]
 """Beginning and end of each interval, rad."""
 _COUNTS_AS = 20
 """Calls that an interpreted one counts as: it takes up to 20 ms, compiled 50 us."""
-_AGREEMENT = 1e-5
+_AGREEMENT = 1e-3
 """Largest difference of compiled from interpreted ends, rad: roots amplify rounding where two nearly coincide."""
 
 
