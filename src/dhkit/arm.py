@@ -951,8 +951,7 @@ class Arm:
         -------
         list[tuple[float, float]]
             Beginning and end of each interval, rad, in ascending order; of an arm angle in [-pi, pi], where one that
-            goes through pi is in two parts. Those of an arm angle are roots of equations. Joint 7 is tried at steps of
-            half a degree: a narrower interval may be missing.
+            goes through pi is in two parts.
 
         Raises
         ------

@@ -135,7 +135,7 @@ class _Writer:
 
         terms = [self._without_sign(k) for k in pack]
         if "negate" in operations:
-            return _Step(_packs(terms), lambda values: self._signed(_signs(terms), *values))
+            return _Step((_pack_of(terms),), lambda values: self._signed(_signs(terms), *values))
         if operations <= {"add", "subtract"}:
             return self._sum(pack)
         if len(operations) == 1 and "input" not in operations:
@@ -162,7 +162,7 @@ class _Writer:
                 return x + y if signs[0] > 0 else x - y
             return self._signed(_signs(first_terms), x) + self._signed(signs, y)
 
-        return _Step((*_packs(first_terms), *_packs(second_terms)), write)
+        return _Step((_pack_of(first_terms), _pack_of(second_terms)), write)
 
     def _operation(self, pack: _Pack) -> _Step:
         """Return how one operation of all lanes is computed."""
@@ -282,8 +282,8 @@ def _of_one_kind(values: Sequence[Value]) -> Sequence[Value]:
     return values if are_truths else [as_number(value) for value in values]
 
 
-def _packs(terms: Iterable[_Term]) -> tuple[_Pack]:
-    return (tuple(node for _, node in terms),)
+def _pack_of(terms: Iterable[_Term]) -> _Pack:
+    return tuple(node for _, node in terms)
 
 
 def _signs(terms: Iterable[_Term]) -> list[float]:

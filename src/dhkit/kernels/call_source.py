@@ -186,9 +186,9 @@ def call_source(
 
     The arguments are one array for each input after the parameters, and ``out`` or None. Taken are arrays of float64,
     C-contiguous, of the inputs' shapes, or all with a batch axis of 1 to ``MAX_ITEMS`` items before it
-    (``MAX_IN_LANES`` where :func:`takes_lanes`), and an ``out`` of the result's shape. An input of shape () may be a
-    float, if the others are of a single item, and is not the first. The result is ``out`` or a new
-    array; None of arguments that are not taken, which stay unchanged. Results are NaN by the rule of
+    (``MAX_IN_LANES`` where :func:`takes_lanes`), and an ``out`` of the result's shape. An input of shape (), but not
+    the first one, may be a float where the others are of a single item. The result is ``out`` or a new array; None of
+    arguments that are not taken, which stay unchanged. Results are NaN by the rule of
     :func:`dhkit.kernels.llvm_source.llvm_source`.
 
     Of a program with several outputs, the first one is that array, and the others are the content of a ``bytes``

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 
 from dhkit.kernels.lowering import plain_results
-from dhkit.kernels.vectors import FUSING, WIDTH, Body, Mask, Vector, select
+from dhkit.kernels.vectors import FUSING, WIDTH, Body, Mask, Vector, select, spread
 from dhkit.symbolic import Pipeline, PipelineStep
 from dhkit.symbolic.programs.pipeline import INDEX
 
@@ -213,17 +213,17 @@ def _store_at_places(
         # Those that fill up the last vector keep their places.
         own = _index(body)
         places = select(own < float(step.items), places, own)
+    single = Body(body.liberties, 1, body.lines)
     for lane in range(body.width):
-        number = body.define(f"extractelement {body.number_type} {places.name}, i64 {lane}")
-        place = body.define(f"fptosi double {number} to i64")
+        place = body.define(f"fptosi double {places.lane(single, lane).name} to i64")
         for pointer, entries in zip(written, results, strict=False):
             for entry, value in enumerate(entries):
-                one = body.define(f"extractelement {body.number_type} {value.name}, i64 {lane}")
+                one = value.lane(single, lane)
                 start = body.define(
                     f"getelementptr double, ptr {pointer}, i64 {entry * _padded(step.items)}"
                 )
                 address = body.define(f"getelementptr double, ptr {start}, i64 {place}")
-                body.lines.append(f"  store double {one}, ptr {address}, align 8")
+                body.lines.append(f"  store double {one.name}, ptr {address}, align 8")
 
 
 def _for_all(body: Body, lines: list[str], pointer: str, places: Sequence[int]) -> list[Vector]:
@@ -260,14 +260,11 @@ def _loaded(body: Body, pointer: str, step: PipelineStep, entry: int) -> Vector:
 
 def _index(body: Body) -> Vector:
     """Return the numbers of the current items."""
-    first = Vector(body, body.define("sitofp i64 %item to double"))
+    single = Body(body.liberties, 1, body.lines)
+    first = Vector(single, body.define("sitofp i64 %item to double"))
     if body.width == 1:
-        return first
-    kind = body.number_type
-    lane = body.define(f"insertelement {kind} poison, double {first.name}, i64 0")
-    all_lanes = f"shufflevector {kind} {lane}, {kind} poison, <{body.width} x i32> zeroinitializer"
-    numbers = ", ".join(f"double {float(k)}" for k in range(body.width))
-    return Vector(body, body.define(f"fadd {kind} {body.define(all_lanes)}, <{numbers}>"))
+        return Vector(body, first.name)
+    return spread(body, first) + Vector(body, body.constants(range(body.width)))
 
 
 def _any(body: Body, step: PipelineStep, goes_on: Vector) -> str:

@@ -15,28 +15,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import reduce
 from typing import Any, TypeAlias
 
 import casadi as ca
 
 from dhkit.kinematics.closed_form.arm_angle import BentArm, bent_arms
-from dhkit.kinematics.closed_form.family import Fit, PoseSymbols, Vector
+from dhkit.kinematics.closed_form.family import Fit, Vector
 from dhkit.kinematics.closed_form.formulas import SINGULAR, angle, hypot
 from dhkit.kinematics.closed_form.program import is_pose
-from dhkit.kinematics.limit_symbols import LIMIT_NUMBERS, Limits, wave_root
+from dhkit.kinematics.limit_symbols import ArmSymbols, Limits, wave_root
 from dhkit.kinematics.polynomial.pose_steps import place_in_order
 from dhkit.kinematics.turn_parts import (
     ARM_ANGLE_PARTS as PARTS,
     BEYOND,
     KNOWN,
     NO_POSE,
-    RESULTS,
     UNKNOWN,
 )
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
-from dhkit.symbolic.programs.graph import Variable
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
@@ -58,29 +55,22 @@ def arm_angle_program(fit: Fit) -> Pipeline:
     fit
         The arm as a member of its family.
     """
-    count = len(fit.vector())
-    parameters = ca.SX.sym("parameters", count + LIMIT_NUMBERS)
-    limits = Limits.read(parameters[count:])
-    steps = (
-        _equations(parameters, fit, limits),
-        _roots(parameters),
-        _parts(parameters, limits),
-    )
-    inputs = (Variable("parameters", (parameters.numel(),)), Variable("T", (4, 4)))
-    return Pipeline("arm_angle_parts", inputs, steps, RESULTS)
+    arm = ArmSymbols(fit)
+    steps = (_equations(arm), _roots(arm.parameters), _parts(arm.parameters, arm.limits))
+    return arm.pipeline("arm_angle_parts", steps)
 
 
-def _equations(parameters: _SX, fit: Fit, limits: Limits) -> PipelineStep:
+def _equations(arm: ArmSymbols) -> PipelineStep:
     """Return the step that finds the waves, and the equations of joints at their limits."""
     T = ca.SX.sym("T", 4, 4)
-    p = fit.named(parameters[: len(fit.vector())])
-    pose = PoseSymbols(T=T[:3, :], scale=p["reach"] + ca.norm_1(T[:3, 3]))
-    arms = bent_arms(p, pose)
+    p = arm.p
+    limits = arm.limits
+    arms = bent_arms(p, arm.pose(T))
     twists = [(p["alpha1"][1], p["alpha2"][1]), (p["alpha5"][1], p["alpha6"][1])]
 
     # Waves at cos(psi) = sin(psi) = 0, which is no angle, are a; at 1 and 0 they are a + b, at 0 and 1 they are a + c.
     a, a_and_b, a_and_c = (
-        _wave_values(bent_arms(p, replace(pose, free=free)), twists)
+        _wave_values(bent_arms(p, arm.pose(T, free)), twists)
         for free in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     )
     waves = [(x, y - x, z - x) for x, y, z in zip(a, a_and_b, a_and_c, strict=True)]
@@ -98,7 +88,7 @@ def _equations(parameters: _SX, fit: Fit, limits: Limits) -> PipelineStep:
     state = ca.if_else(is_aligned, float(UNKNOWN), float(KNOWN))
     state = ca.if_else(arms[0].elbow.miss == 0, state, float(BEYOND))
     state = ca.if_else(is_pose(T), state, float(NO_POSE))
-    elbows = [limits.inside(3, angle(arm.elbow.theta_4)) for arm in arms]
+    elbows = [limits.inside(3, angle(bent.elbow.theta_4)) for bent in arms]
     outputs = {
         # Each equation is there for either of its roots.
         "equation": ca.vertcat(*(ca.vertcat(column, column) for column in columns)),
@@ -106,7 +96,7 @@ def _equations(parameters: _SX, fit: Fit, limits: Limits) -> PipelineStep:
         "elbows": ca.vertcat(*(ca.if_else(is_inside, 1.0, 0.0) for is_inside in elbows)),
         "state": state,
     }
-    return PipelineStep(Graph.of("equations", {"parameters": parameters, "T": T}, outputs))
+    return PipelineStep(Graph.of("equations", {"parameters": arm.parameters, "T": T}, outputs))
 
 
 def _wave_values(arms: Sequence[BentArm], twists: Sequence[tuple[_SX, _SX]]) -> list[_SX]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,13 @@ from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.pose_results import PoseProgram, output_sizes
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import INEXACT, SAME_ANGLE, SORTED_BY, are_distinct
+from dhkit.kinematics.polynomial.solve import (
+    INEXACT,
+    SAME_ANGLE,
+    SORTED_BY,
+    are_distinct,
+    sorting_key,
+)
 from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, NEAR_SOLUTION, NONE, ROOTS
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
@@ -325,8 +331,7 @@ def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
     # share joints 1 to 3. Angles at -pi are those at pi.
     some = q[:, :SORTED_BY]
     around = np.where(some < SAME_ANGLE - np.pi, some + 2 * np.pi, some)
-    first, *others = np.rint(around.T / SAME_ANGLE) * SAME_ANGLE
-    by_joints = first + SAME_ANGLE * reduce(lambda sum_, x: 0.1 * (x + sum_), others[::-1], 0.0)
+    by_joints = sorting_key([*(np.rint(around.T / SAME_ANGLE) * SAME_ANGLE)])
     place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
     shape = (poses, max(1, int(counts.max(initial=0))))
     keys = np.full(shape, np.inf)

@@ -35,7 +35,7 @@ from dhkit.kinematics.closed_form.spherical_shoulder import (
     at_joint_7,
     spherical_shoulder_formulas,
 )
-from dhkit.kinematics.limit_symbols import LIMIT_NUMBERS, Limits, wave_root
+from dhkit.kinematics.limit_symbols import ArmSymbols, wave_root
 from dhkit.kinematics.polynomial.extension import Extension, Root
 from dhkit.kinematics.polynomial.pose_steps import (
     PolynomialSource,
@@ -50,18 +50,16 @@ from dhkit.kinematics.polynomial.roots_program import (
     polynomial_of,
     sizes_of,
 )
+from dhkit.kinematics.redundant import JOINTS
 from dhkit.kinematics.turn_parts import (
     JOINT_7_PARTS as PARTS,
-    JOINTS,
     KNOWN,
     NO_POSE,
-    RESULTS,
     TOUCHING,
     UNKNOWN,
 )
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
 from dhkit.symbolic.differentiable.vectors import dot
-from dhkit.symbolic.programs.graph import Variable
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
@@ -89,9 +87,8 @@ def joint_7_program(fit: Fit) -> Pipeline:
     fit
         The arm as a member of its family.
     """
-    count = len(fit.vector())
-    parameters = ca.SX.sym("parameters", count + LIMIT_NUMBERS)
-    arm = _Arm(fit, parameters, Limits.read(parameters[count:]))
+    arm = ArmSymbols(fit)
+    parameters = arm.parameters
     steps = (
         _values(arm),
         _tables(parameters),
@@ -107,30 +104,20 @@ def joint_7_program(fit: Fit) -> Pipeline:
         _ends(parameters),
         _parts(arm),
     )
-    inputs = (Variable("parameters", (parameters.numel(),)), Variable("T", (4, 4)))
-    return Pipeline("joint_7_parts", inputs, steps, RESULTS)
+    return arm.pipeline("joint_7_parts", steps)
 
 
-class _Arm:
-    """Symbols of an arm."""
-
-    def __init__(self, fit: Fit, parameters: _SX, limits: Limits) -> None:
-        self.parameters = parameters
-        self.p = fit.named(parameters[: len(fit.vector())])
-        self.limits = limits
-
-    def pose(self, T: _SX, q_7: _SX) -> PoseSymbols:
-        """Return a pose with an angle of joint 7, rad."""
-        scale = self.p["reach"] + ca.norm_1(T[:3, 3])
-        return PoseSymbols(T=T[:3, :], scale=scale, free=(ca.cos(q_7), ca.sin(q_7)))
+def _at_angle(arm: ArmSymbols, T: _SX, q_7: _SX) -> PoseSymbols:
+    """Return a pose with an angle of joint 7, rad."""
+    return arm.pose(T, (ca.cos(q_7), ca.sin(q_7)))
 
 
-def _values(arm: _Arm) -> PipelineStep:
+def _values(arm: ArmSymbols) -> PipelineStep:
     """Return the step that evaluates the polynomials at equally spaced angles, and the cosine of joint 4's bend."""
     p = arm.p
     T = ca.SX.sym("T", 4, 4)
     index = ca.SX.sym("index")
-    link_6, centre, seen = at_joint_7(p, arm.pose(T, _FIRST + index * (math.tau / SAMPLES)))
+    link_6, centre, seen = at_joint_7(p, _at_angle(arm, T, _FIRST + index * (math.tau / SAMPLES)))
 
     # Joint 4, as in elbow_bent: the law of cosines across its axis.
     along = p["fore"][2] - p["upper"][2]
@@ -265,7 +252,7 @@ def _root_steps(parameters: _SX, name: str, lane: int) -> tuple[PipelineStep, ..
     return (*estimate_steps(parameters, source), real)
 
 
-def _all_roots(arm: _Arm) -> PipelineStep:
+def _all_roots(arm: ArmSymbols) -> PipelineStep:
     """Return the step that puts the roots together, with those of joint 4, and tells whether they are known."""
     T = ca.SX.sym("T", 4, 4)
     wave = ca.SX.sym("wave", 3)
@@ -328,13 +315,13 @@ def _ends(parameters: _SX) -> PipelineStep:
     return PipelineStep(graph, shared={"begins": "sorted_begin"})
 
 
-def _parts(arm: _Arm) -> PipelineStep:
+def _parts(arm: ArmSymbols) -> PipelineStep:
     """Return the step that tells whether some solution in the middle of a part is inside the limits."""
     T = ca.SX.sym("T", 4, 4)
     begin = ca.SX.sym("sorted_begin")
     end = ca.SX.sym("end")
     is_inside = ca.SX(0.0) > 0.0
-    for branch in spherical_shoulder_formulas(arm.p, arm.pose(T, (begin + end) / 2.0)):
+    for branch in spherical_shoulder_formulas(arm.p, _at_angle(arm, T, (begin + end) / 2.0)):
         is_allowed = branch.miss == 0
         for k, q in enumerate(branch.q[: JOINTS - 1]):
             theta = q + arm.limits.offset[k] * math.tau

@@ -1,4 +1,4 @@
-"""Symbols of joint limits in programs of intervals of the redundancy, and the roots of waves."""
+"""Symbols of an arm and its limits in programs of intervals of the redundancy, and the roots of waves."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
+from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import Pair, hypot
-from dhkit.kinematics.turn_parts import JOINTS, TOUCHING
+from dhkit.kinematics.redundant import JOINTS
+from dhkit.kinematics.turn_parts import RESULTS, TOUCHING
+from dhkit.symbolic import Pipeline, PipelineStep
+from dhkit.symbolic.programs.graph import Variable
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
-LIMIT_NUMBERS = 7 * JOINTS
-"""Number of the parameters of limits."""
+_LIMIT_NUMBERS = 7 * JOINTS
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,34 @@ class Limits:
         """Return whether an angle theta, rad, is inside the limits of a joint for some whole turns."""
         beyond = theta * (1.0 / math.tau) - (self.begin[joint] + self.offset[joint])
         return beyond - ca.floor(beyond) <= self.width[joint]
+
+
+class ArmSymbols:
+    """Symbols of an arm's parameters, as :func:`dhkit.kinematics.turn_parts.interval_parameters` orders them.
+
+    Attributes
+    ----------
+    parameters
+        All of them, a column.
+    p, limits
+        Those of the fit, by name, and the limits.
+    """
+
+    def __init__(self, fit: Fit) -> None:
+        count = len(fit.vector())
+        self.parameters = ca.SX.sym("parameters", count + _LIMIT_NUMBERS)
+        self.p = fit.named(self.parameters[:count])
+        self.limits = Limits.read(self.parameters[count:])
+
+    def pose(self, T: _SX, free: Pair = (1.0, 0.0)) -> PoseSymbols:
+        """Return a pose T, 4 x 4, at a redundancy, as a pair."""
+        scale = self.p["reach"] + ca.norm_1(T[:3, 3])
+        return PoseSymbols(T=T[:3, :], scale=scale, free=free)
+
+    def pipeline(self, name: str, steps: Sequence[PipelineStep]) -> Pipeline:
+        """Return the program of steps from the tool's pose T to ``RESULTS``."""
+        inputs = (Variable("parameters", (self.parameters.numel(),)), Variable("T", (4, 4)))
+        return Pipeline(name, inputs, tuple(steps), RESULTS)
 
 
 def wave_root(wave: tuple[_SX, _SX, _SX], sign: _SX) -> _SX:

@@ -317,11 +317,7 @@ class _NearestBranch:
 
     @classmethod
     def of(
-        cls,
-        solutions: IKSolutions,
-        usable: NDArray[np.bool_],
-        q0: Array,
-        limits: bool,
+        cls, solutions: IKSolutions, usable: NDArray[np.bool_], q0: Array, limits: bool
     ) -> _NearestBranch:
         """Return the branches of a path; ``q0`` are any joint values, shape (n,)."""
         width = solutions.upper - solutions.lower

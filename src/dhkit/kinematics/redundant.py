@@ -84,9 +84,8 @@ def solve_redundant(
         Number of threads for a large batch of a closed form.
     prefer
         How a value is chosen, for the best solution inside the limits at the 33 values and then, 64 times as fine,
-        around the best of them: ``"limits"``, the
-        farthest from the limits; ``"manipulability"``, that of :func:`dhkit.kinematics.manipulability` for whole
-        motions; or joint positions (7,), rad, the nearest to them.
+        around the best of them: ``"limits"``, the farthest from the limits; ``"manipulability"``, that of
+        :func:`dhkit.kinematics.manipulability` for whole motions; or joint positions (7,), rad, the nearest to them.
     out
         Array for the joint positions, shape (..., 8, 7), float64, contiguous. Only for closed forms.
 

@@ -15,10 +15,10 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ARM_ANGLE, Fit
+from dhkit.kinematics.redundant import JOINTS
 from dhkit.kinematics.turn_parts import (
     ARM_ANGLE_PARTS,
     JOINT_7_PARTS,
-    JOINTS,
     KNOWN,
     RESULTS,
     interval_parameters,

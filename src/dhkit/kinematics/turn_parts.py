@@ -13,8 +13,8 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.closed_form.family import Fit, limit_parameters
+from dhkit.kinematics.redundant import JOINTS
 
-JOINTS = 7
 RESULTS = ("sorted_begin", "sorted_inside", "state")
 """Outputs of a program:
 

@@ -68,13 +68,13 @@ def arm_angle_fit(axes: Axes) -> Fit | None:
 
 def arm_angle_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the eight branches at psi = ``pose.free``: joint 4 bent to either side, then joint 6, then joint 2."""
+    free_1 = add_angles(pose.free_1, p["offset1"])
+    free_5 = add_angles(pose.free_5, p["offset5"])
     branches: list[Branch] = []
     for arm in bent_arms(p, pose):
         elbow = arm.elbow
         x_3, _, z_3 = arm.shoulder
         x_7, _, z_7 = arm.wrist
-        free_1 = add_angles(pose.free_1, p["offset1"])
-        free_5 = add_angles(pose.free_5, p["offset5"])
         for side in SIGNS:
             wrist, wrist_is_singular = three_joints(
                 z_7, x_7, (p["alpha5"], p["alpha6"]), side, free_5

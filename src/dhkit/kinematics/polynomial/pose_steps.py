@@ -28,7 +28,7 @@ from dhkit.kinematics.polynomial.roots_program import (
     sizes_of,
     square_of_distance,
 )
-from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE, SORTED_BY
+from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE, SORTED_BY, sorting_key
 from dhkit.kinematics.polynomial.trigonometric import (
     DEGREE,
     DOUBTFUL,
@@ -351,8 +351,7 @@ def known_solutions(
     # As dhkit.kinematics.eliminated.ordered has it. Angles at -pi are those at pi.
     some = ca.vertsplit(q[:SORTED_BY])
     around = [ca.if_else(x < SAME_ANGLE - math.pi, x + math.tau, x) for x in some]
-    first, *further = (ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around)
-    order = first + SAME_ANGLE * reduce(lambda sum_, x: 0.1 * (x + sum_), further[::-1], ca.SX(0.0))
+    order = sorting_key([ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around])
     # Finite even where q is NaN: the place at which a root is stored follows from it.
     order = ca.if_else(ca.fabs(order) < _BELOW_ALL, order, 0.0)
 

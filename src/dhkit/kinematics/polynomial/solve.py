@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,18 @@ class Found:
     def counts(self) -> NDArray[np.intp]:
         """Number of solutions of each pose, shape (N,)."""
         return np.bincount(self.owner, minlength=len(self.expected))
+
+
+def sorting_key(angles: Sequence[Any]) -> Any:
+    """Return q1 + SAME_ANGLE (q2 / 10 + q3 / 100 + ...), by which solutions are sorted.
+
+    Parameters
+    ----------
+    angles
+        The first ``SORTED_BY`` joints' angles, whole multiples of ``SAME_ANGLE``, rad: arrays or CasADi expressions.
+    """
+    first, *others = angles
+    return first + SAME_ANGLE * sum(x * 0.1**k for k, x in enumerate(others, start=1))
 
 
 def solve(description: Description, elimination: Elimination, poses: Array) -> Found:
