@@ -312,6 +312,9 @@ def test_compiled_intervals_are_those_of_the_interpreter(name):
     for wrong in (np.full((4, 4), np.nan), np.ones((4, 4))):
         with pytest.raises(ValueError, match="T is not a pose"):
             arm.redundancy_intervals(wrong)
+    for count in (1, 3):
+        with pytest.raises(ValueError, match=rf"T has shape \({count}, 4, 4\); expected \(4, 4\)"):
+            arm.redundancy_intervals(np.array(poses[:count]))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 from functools import lru_cache
@@ -120,11 +121,14 @@ class IntervalsByRoots:
         if found is None:
             return None
         begins, packed = found
+        if begins.ndim != 1:
+            # The function takes several poses as well.
+            return None
         *are_inside, state = self._packed.unpack(packed)
-        # NaN where an entry of T is not finite.
-        return (
-            None if state != state else (state, self._intervals(begins.tolist(), are_inside, state))
-        )
+        if math.isnan(state):
+            # An entry of T is not finite.
+            return None
+        return state, self._intervals(begins.tolist(), are_inside, state)
 
     def interpreted(self, T: Array) -> tuple[float, Intervals]:
         """Return state and intervals at a pose, shape (4, 4), m."""
