@@ -365,7 +365,7 @@ def test_the_compiled_elimination_finds_what_lapack_finds(name, law):
     # Poses that are not reached.
     T[5, 3] += 10 * arm.description.reach
     compiled = six_joints(arm.description)(T)
-    by_lapack = solve(arm.description, elimination.lapack, T)
+    by_lapack = solve(arm.description, elimination.lapack.candidates, T)
     assert np.mean(compiled.counts >= by_lapack.counts) > 0.98
     found = np.abs(np.angle(np.exp(1j * (compiled.q - q[compiled.owner])))).max(axis=1) < 1e-6
     is_found = np.isin(np.arange(len(q)), compiled.owner[found])
@@ -521,7 +521,7 @@ def test_compiled_eliminations_call_no_missing_solution_complete(name, law):
     for elimination in (first, *others):
         for one in elimination.kernels:
             one.compile()
-        found = solve(description, elimination, T)
+        found = solve(description, elimination.candidates, T)
         near = np.abs(np.angle(np.exp(1j * (found.q - q[found.owner])))).max(axis=1) < 1e-5
         is_missed = ~np.isin(np.arange(len(q)), found.owner[near])
         # Of the other ways, only solutions that lie at their roots count.

@@ -25,7 +25,7 @@ from dhkit.kinematics.closed_form.formulas import SINGULAR
 from dhkit.kinematics.jacobian import jacobian, jacobian_kernel
 from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
-from dhkit.kinematics.polynomial.pose_results import PoseProgram, output_sizes
+from dhkit.kinematics.polynomial.pose_results import PoseProgram, PoseResults, output_sizes
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import (
     INEXACT,
@@ -40,8 +40,7 @@ from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
 _TOGETHER = 256
 """Poses whose roots are held together, some 500 KB."""
-_FURTHER_WAYS = 2
-"""Number of further eliminations whose programs are tried before poses are solved with care."""
+_SINGULAR = np.uint8(IKFlag.singular)
 _OUT_OF_LIMITS = np.uint8(IKFlag.out_of_limits)
 _MOST_NUMBERS = 4_000_000
 """Largest number of distances that are held at a time, 32 MB."""
@@ -99,25 +98,17 @@ def solve_by_elimination(description: Description, T: ArrayLike) -> IKSolutions:
 
 def _solved(description: Description, poses: Array) -> IKSolutions:
     """Return the solutions of matrices (N, 4, 4)."""
-    first, *others = six_joints(description).ways
+    first = six_joints(description).elimination
     # Interpreted, the program for single poses takes longer than what it saves. It is asked about a batch of no items,
     # which counts nothing towards compiling.
     if has_curves(description) or not first.pose_kernel.is_compiled_for(0):
         return _solved_with_care(description, poses)
-    goals = poses.reshape(-1, 16)
-    sure = _SurePoses.of(description, first, goals)
+    sure = _SurePoses.of(description, first, poses.reshape(-1, 16))
     rows = np.flatnonzero(sure.counts == 0)
-    for way in others[:_FURTHER_WAYS]:
-        # Where roots of one polynomial nearly coincide, those of another one lie apart.
-        if len(rows) and way.pose_kernel.is_compiled_for(len(rows)):
-            more = _SurePoses.of(description, way, goals[rows])
-            sure.q[rows] = more.q
-            sure.flags[rows] = more.flags
-            sure.counts[rows] = more.counts
-            rows = rows[more.counts == 0]
     if not len(rows):
         return sure.solutions(description)
-    return sure.solutions(description, rows, _solved_with_care(description, poses[rows]))
+    others = _solved_with_care(description, poses[rows], sure.unsure)
+    return sure.solutions(description, rows, others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +121,8 @@ class _SurePoses:
     """Shape (N, 16), likewise."""
     counts: NDArray[np.intp]
     """Number of solutions, shape (N,); 0 of other poses."""
+    unsure: PoseResults
+    """The roots of the other poses, in their order."""
 
     @classmethod
     def of(cls, description: Description, arm: PoseProgram, poses: Array) -> _SurePoses:
@@ -139,13 +132,24 @@ class _SurePoses:
         q = np.empty((len(poses), ROOTS, description.n))
         flags = np.empty((len(poses), ROOTS), dtype=np.uint8)
         counts = np.empty(len(poses), dtype=np.intp)
+        details = []
+        errors = []
         for begin in range(0, len(poses), _TOGETHER):
             some = slice(begin, begin + _TOGETHER)
             goals = poses[some]
             others = [np.empty((len(goals), size)) for size in output_sizes(arm.details)[1:]]
             arm.pose_kernel(parameters, [goals], [q[some].reshape(len(goals), -1), *others])
             flags[some], counts[some] = _flags_and_counts(others, q[some])
-        return cls(q, flags, counts)
+            is_unsure = counts[some] == 0
+            _, of_roots, _, error = others
+            details.append(of_roots[is_unsure])
+            errors.append(error[is_unsure])
+        unsure = PoseResults.read(
+            q[counts == 0],
+            np.concatenate([np.empty((0, arm.details * ROOTS)), *details]),
+            np.concatenate([np.empty((0, 1)), *errors]),
+        )
+        return cls(q, flags, counts, unsure)
 
     def solutions(
         self,
@@ -211,16 +215,33 @@ def _flags_and_counts(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8]
     return np.where(are_outside == 1.0, _OUT_OF_LIMITS, np.uint8(0)), counts
 
 
-def _solved_with_care(description: Description, poses: Array) -> IKSolutions:
-    """Return the solutions of matrices (N, 4, 4); roots may nearly coincide, or not be known well."""
+def _solved_with_care(
+    description: Description, poses: Array, results: PoseResults | None = None
+) -> IKSolutions:
+    """Return the solutions of matrices (N, 4, 4); roots may nearly coincide, or not be known well.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    poses
+        The matrices.
+    results
+        What the program of the first elimination found at them, if it has run.
+    """
     posed = are_poses(poses)
     goals = orthonormal(poses[posed])
-    found = six_joints(description)(goals.reshape(-1, 16))
+    known = None if results is None else results.at(posed)
+    found = six_joints(description)(goals.reshape(-1, 16), known)
 
     rows = np.flatnonzero(posed)
-    table = ordered(found.q, rows[found.owner], posed.size)
-    B = table.shape[1]
-    flags, is_nearly_curve = _singular_flags(description, table)
+    places = ordered(found.q, rows[found.owner], posed.size)
+    B = places.shape[1]
+    is_singular, is_exactly = _are_singular(description, found.q, found.may_be_singular)
+    # Near a curve of solutions, iteration closes at points beside it: some of them are nearly exactly singular.
+    is_nearly_curve = np.bincount(rows[found.owner[is_exactly]], minlength=posed.size) > 1
+    table = np.vstack([found.q, np.full(description.n, np.nan)])[places]
+    flags = np.append(np.where(is_singular, _SINGULAR, np.uint8(0)), np.uint8(0))[places]
     are_false = is_nearly_curve | _have_clusters(table, flags)
     is_known = found.is_complete & ~are_false[rows]
     none_exist = np.zeros(posed.size, dtype=bool)
@@ -262,24 +283,27 @@ def elimination_kernels(description: Description) -> list[Kernel]:
     return [*six_joints(description).elimination.kernels, descent, of_jacobian]
 
 
-def _singular_flags(
-    description: Description, q: Array
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Return the flags of singular solutions (N, B, n), shape (N, B), and which poses are nearly curves, (N,).
+def _are_singular(
+    description: Description, q: Array, may_be: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which solutions are singular, and which exactly, shape (K,) each.
 
-    Near a curve of solutions, iteration closes at points beside it: two of them or more are nearly exactly singular.
+    Parameters
+    ----------
+    description
+        The robot.
+    q
+        Solutions, shape (K, n), rad.
+    may_be
+        Those that have not been shown to be regular, shape (K,).
     """
-    flags = np.zeros(q.shape[:2], dtype=np.uint8)
-    is_asked = ~np.isnan(q).any(axis=-1)
-    J = jacobian(description, q[is_asked])
+    is_singular, is_exactly = np.zeros((2, len(q)), dtype=bool)
+    J = jacobian(description, q[may_be])
     # Without units: velocities over the reach.
     J[:, :3] /= Axes.of(description).scale
-    is_singular = has_small_singular_value(J, SINGULAR)
-    flags[is_asked] = np.where(is_singular, np.uint8(IKFlag.singular), np.uint8(0))
-    is_exactly = np.zeros(q.shape[:2], dtype=bool)
-    is_exactly[flags > 0] = has_small_singular_value(J[is_singular], _EXACTLY)
-    is_nearly_curve = np.count_nonzero(is_exactly, axis=1) > 1
-    return flags, is_nearly_curve
+    is_singular[may_be] = are_small = has_small_singular_value(J, SINGULAR)
+    is_exactly[is_singular] = has_small_singular_value(J[are_small], _EXACTLY)
+    return is_singular, is_exactly
 
 
 def _have_clusters(q: Array, flags: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -287,7 +311,7 @@ def _have_clusters(q: Array, flags: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
     Where many roots coincide, Newton's method closes at false solutions near the true one.
     """
-    is_singular = flags & np.uint8(IKFlag.singular) > 0
+    is_singular = flags == _SINGULAR
     have = np.zeros(len(q), dtype=bool)
     every = np.flatnonzero(np.count_nonzero(is_singular, axis=1) > 1)
     # Each pose has a distance for any two of its solutions, of which there may be hundreds near a curve of them.
@@ -314,8 +338,8 @@ def has_curves(description: Description) -> bool:
     return freedoms(description, "whole") < description.n
 
 
-def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
-    """Return solutions (K, n) as a table, shape (poses, B, n), those of a pose sorted, and filled up with NaN.
+def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> NDArray[np.intp]:
+    """Return the places of solutions (K, n) in a table of poses, shape (poses, B), those of a pose sorted, then K.
 
     Parameters
     ----------
@@ -332,10 +356,9 @@ def ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:
     some = q[:, :SORTED_BY]
     around = np.where(some < SAME_ANGLE - np.pi, some + 2 * np.pi, some)
     by_joints = sorting_key([*(np.rint(around.T / SAME_ANGLE) * SAME_ANGLE)])
-    place = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
+    column = np.arange(len(q)) - np.repeat(np.cumsum(counts) - counts, counts)
     shape = (poses, max(1, int(counts.max(initial=0))))
-    keys = np.full(shape, np.inf)
-    keys[owner, place] = by_joints
-    table = np.full((*shape, q.shape[1]), np.nan)
-    table[owner, place] = q
-    return np.take_along_axis(table, np.argsort(keys, axis=1)[..., None], axis=1)
+    places = np.full(shape, len(q))
+    # By pose, then by the key.
+    places[owner, column] = np.lexsort((by_joints, owner))
+    return places

@@ -33,7 +33,6 @@ from dhkit.kinematics.polynomial.pose_results import (
     COMMON_DETAILS,
     PoseResults,
     output_sizes,
-    with_rows,
 )
 from dhkit.kinematics.polynomial.solve import Candidates
 from dhkit.kinematics.polynomial.trigonometric import angles, real_roots, roots_kernel
@@ -62,8 +61,6 @@ _MIXED = 0.7 + 0.3j
 """Factor t of t x + y, by which two solutions differ even if they share x or y."""
 _OF_TWO_POWERS: Complex = np.kron(_AS_POWERS, _AS_POWERS)
 _EACH = slice(None)
-_NEAR = 1e-6
-"""Error of joint values, share of the reach and rad, above which a root is solved once more."""
 _FIRST_ANGLE = 0.1
 """First angle at which polynomials are evaluated, rad."""
 _WORK = 4
@@ -87,7 +84,7 @@ class _FarSide:
 
 @dataclass(frozen=True, eq=False)
 class CompiledGeneral:
-    """An elimination as a program for one pose; by LAPACK until it is compiled, and where roots nearly coincide."""
+    """An elimination as a program for one pose; by LAPACK until it is compiled."""
 
     lapack: General
 
@@ -125,14 +122,17 @@ class CompiledGeneral:
         """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
         if not self.pose_kernel.is_compiled_for(_WORK * len(poses)):
             return self.lapack.candidates(poses)
-        results = PoseResults.of(self, poses)
-        found = results.candidates()
-        # Two solutions may share a root, or the elimination may fail.
-        is_doubtful = results.is_delicate | (results.is_near & ~(results.error < _NEAR))
-        rows = np.flatnonzero(is_doubtful.any(axis=1) | ~np.isfinite(found.error_of_polynomial))
-        if not len(rows):
-            return found
-        return with_rows(found, rows, self.lapack.candidates(poses[rows]))
+        return self.candidates_of(PoseResults.of(self, poses), poses)
+
+    def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:  # noqa: ARG002
+        """Return joint values at the roots that the program found at poses; of a root with two solutions just one."""
+        return results.candidates()
+
+    def candidates_by_lapack(self, poses: Array) -> Candidates:
+        """Return joint values at the roots of the polynomial of poses, shape (N, 16), m, all where two share a root."""
+        if not self.pose_kernel.is_compiled_for(_WORK * len(poses)):
+            return self.lapack.candidates(poses)
+        return self.lapack.candidates_at(PoseResults.of(self, poses), poses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,34 @@ class General:
         owner = roots.owner[of_root]
         error = magnitude(self.newton.error(q, poses[owner]))
         is_near = roots.is_delicate
-        return Candidates(q, error, owner, of_root, roots.expected, is_near, is_near, roots.error)
+        return Candidates(
+            q,
+            error,
+            np.ones(len(q), dtype=bool),
+            owner,
+            of_root,
+            roots.expected,
+            is_near,
+            is_near,
+            roots.error,
+        )
+
+    def candidates_at(self, results: PoseResults, poses: Array) -> Candidates:
+        """Return joint values at the roots that the elimination's program found at poses, shape (N, 16), m."""
+        roots = results.candidates()
+        angles = results.angle[results.is_near]
+        motions = self._motions(poses)
+        side = self._reduced(motions)
+        of_root, q = self._joints_at_roots(motions, side, roots.owner, angles)
+        owner = roots.owner[of_root]
+        return replace(
+            roots,
+            q=q,
+            error=magnitude(self.newton.error(q, poses[owner])),
+            may_be_singular=np.ones(len(q), dtype=bool),
+            owner=owner,
+            root=of_root,
+        )
 
     def _joints_at_roots(
         self, motions: Array, side: _FarSide, owner: NDArray[np.intp], roots: Array

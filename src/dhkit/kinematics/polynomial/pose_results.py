@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,7 +13,7 @@ from dhkit.kernels import Kernel
 from dhkit.kinematics.polynomial.solve import Candidates
 from dhkit.kinematics.polynomial.trigonometric import ROOTS, expected_roots
 
-COMMON_DETAILS = 4
+COMMON_DETAILS = 5
 """Number of details of a root that all programs give."""
 
 
@@ -31,6 +31,9 @@ class PoseProgram(Protocol):
     @property
     def details(self) -> int:
         """Number of details of a root."""
+
+    def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:
+        """Return joint values at the roots that the program found at poses, shape (N, 16), m."""
 
 
 def output_sizes(details: int) -> tuple[int, ...]:
@@ -51,6 +54,8 @@ class PoseResults:
     """Whether a root is nearly real, real, near to another, and may have a singular solution, shape (N, 16) each."""
     error: Array
     """Of the joint values, shape (N, 16), shares of the reach and rad."""
+    angle: Array
+    """The root itself, shape (N, 16), rad."""
     more: Array
     """Further details, shape (N, 16, K)."""
     error_of_polynomial: Array
@@ -63,17 +68,34 @@ class PoseResults:
         outputs = [np.empty((len(poses), size)) for size in output_sizes(program.details)]
         program.pose_kernel(parameters, [poses], outputs)
         q, _, of_roots, _, error_of_polynomial = outputs
-        details = of_roots.reshape(len(poses), ROOTS, program.details)
+        return cls.read(q, of_roots, error_of_polynomial)
+
+    @classmethod
+    def read(cls, q: Array, of_roots: Array, error_of_polynomial: Array) -> PoseResults:
+        """Return the results of a program.
+
+        Parameters
+        ----------
+        q, of_roots, error_of_polynomial
+            Its outputs for N poses, shape (N, ...) each: joint values, rad, details of the roots, and the polynomial's
+            error.
+        """
+        details = of_roots.reshape(len(q), ROOTS, of_roots.shape[1] // ROOTS)
         return cls(
-            q.reshape(len(poses), ROOTS, 6),
+            q.reshape(len(q), ROOTS, 6),
             details[:, :, 0] > 0.0,
             details[:, :, 1] > 0.0,
             details[:, :, 2] > 0.0,
             details[:, :, 2] > 1.0,
             details[:, :, 3],
+            details[:, :, 4],
             details[:, :, COMMON_DETAILS:],
-            error_of_polynomial,
+            error_of_polynomial.reshape(len(q), 1),
         )
+
+    def at(self, rows: slice | NDArray[Any]) -> PoseResults:
+        """Return the results of some poses: a slice, indices, or which ones."""
+        return PoseResults(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def candidates(self) -> Candidates:
         """Return the joint values at roots that are nearly real."""
@@ -81,6 +103,7 @@ class PoseResults:
         return Candidates(
             self.q[owner, place],
             self.error[owner, place],
+            self.is_delicate[owner, place],
             owner,
             np.arange(len(owner)),
             expected_roots(self.is_near, self.is_real, self.error_of_polynomial),
@@ -97,40 +120,11 @@ def with_more(found: Candidates, q: Array, error: Array, root: NDArray[np.intp])
     return Candidates(
         np.concatenate([found.q, q])[order],
         np.concatenate([found.error, error])[order],
+        np.concatenate([found.may_be_singular, np.ones(len(q), dtype=bool)])[order],
         found.owner[roots[order]],
         roots[order],
         found.expected,
         found.may_repeat,
         found.is_delicate,
         found.error_of_polynomial,
-    )
-
-
-def with_rows(found: Candidates, rows: NDArray[np.intp], others: Candidates) -> Candidates:
-    """Return candidates of which those of poses ``rows`` (M,) are replaced by the candidates of M poses."""
-    is_replaced = np.zeros(len(found.expected), dtype=bool)
-    is_replaced[rows] = True
-    kept = ~is_replaced[found.owner]
-    # Roots are told apart by numbers.
-    first = 1 + int(found.root.max(initial=0))
-    owner = np.concatenate([found.owner[kept], rows[others.owner]])
-    order = np.argsort(owner, kind="stable")
-
-    def joined(own: NDArray[Any], of_others: NDArray[Any]) -> NDArray[Any]:
-        return np.concatenate([own[kept], of_others])[order]
-
-    def changed(own: NDArray[Any], of_others: NDArray[Any]) -> NDArray[Any]:
-        values = own.copy()
-        values[rows] = of_others
-        return values
-
-    return Candidates(
-        joined(found.q, others.q),
-        joined(found.error, others.error),
-        owner[order],
-        joined(found.root, first + others.root),
-        changed(found.expected, others.expected),
-        changed(found.may_repeat, others.may_repeat),
-        changed(found.is_delicate, others.is_delicate),
-        changed(found.error_of_polynomial, others.error_of_polynomial),
     )

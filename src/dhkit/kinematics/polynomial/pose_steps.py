@@ -49,8 +49,9 @@ RESULTS = ("sorted_q", "sorted_summary", "sorted_details", "posed", "error")
 - joint values, 16 times 6, rad;
 - summary, 16 times 2: what is known of the root (``NONE``, ``SOLUTION``, ``NEAR_SOLUTION`` or ``DOUBTFUL``), and
   whether a joint is outside its limits;
-- details of the root, 16 times 4 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if its
-  solution may be singular or that of another root; the error of its joint values; and more by the way of elimination;
+- details of the root, 16 times 5 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if its
+  solution may be singular or that of another root; the error of its joint values; its angle, rad; and more by the way
+  of elimination;
 - ``posed``, whether T is a pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
@@ -367,7 +368,8 @@ def known_solutions(
 
     is_near = ca.if_else(closeness > 0.0, BESIDE, 0.0)
     care = ca.if_else(is_delicate, _DELICATE, is_near)
-    details = [is_tried, is_real, care, *map(at_tried, (error, *more))]
+    of_tried = map(at_tried, (error, inputs["angle"], *more))
+    details = [is_tried, is_real, care, *of_tried]
     outputs = {
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
         "summary": ca.vertcat(kind, at_tried(is_outside)),

@@ -16,7 +16,15 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.numeric import refined, solve_numerically
 from dhkit.kinematics.polynomial.general import CompiledGeneral, General
-from dhkit.kinematics.polynomial.solve import MOST, Elimination, Found, distinct, solve
+from dhkit.kinematics.polynomial.pose_results import PoseResults
+from dhkit.kinematics.polynomial.solve import (
+    MOST,
+    Elimination,
+    Found,
+    distinct,
+    solve,
+    solve_from,
+)
 from dhkit.kinematics.polynomial.two_parallel import TwoParallel
 
 _TRIALS = 64
@@ -25,6 +33,8 @@ _FOUND = 1e-5
 """Largest difference, rad, of a solution from the joint values that made the pose."""
 _MISSED_COUNTS = 4
 """Number of poses with an incomplete set of solutions that one missed solution counts as."""
+_FURTHER_WAYS = 2
+"""Number of further eliminations whose programs are tried before LAPACK."""
 _MANY = 1e6
 """More than all failures of an elimination."""
 _DISPLACEMENTS = (1e-4, 1e-3, 1e-2)
@@ -77,24 +87,40 @@ class SixJoints:
 
     def _failures(self, elimination: Elimination, q: Array, poses: Array) -> NDArray[np.intp]:
         """Return how badly an elimination fails at poses (N, 16) that were made of joint values (N, 6), shape (N,)."""
-        found = solve(self.description, elimination, poses)
+        found = solve(self.description, elimination.candidates, poses)
         apart = 2 * np.abs(np.sin((found.q - q[found.owner]) / 2)).max(axis=1)
         is_found = np.zeros(len(poses), dtype=bool)
         is_found[found.owner[apart < _FOUND]] = True
         return np.asarray(_MISSED_COUNTS * ~is_found + ~found.is_complete)
 
-    def __call__(self, poses: Array) -> Found:
-        """Return the solutions of poses, shape (N, 16), with orthonormal rotations, m.
+    def __call__(self, poses: Array, results: PoseResults | None = None) -> Found:
+        """Return the solutions of poses, with orthonormal rotations.
 
         Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more by
-        eliminating other joints, then from the solutions of poses beside them, where the roots lie apart, and then by
-        iteration from random starts.
+        eliminating other joints, then by LAPACK, which finds two solutions at one root, then from the solutions of
+        poses beside them, where the roots lie apart, and then by iteration from random starts.
+
+        Parameters
+        ----------
+        poses
+            Shape (N, 16), m.
+        results
+            What the program of :attr:`elimination` found at them; it runs unless that is given.
         """
-        found = solve(self.description, self.elimination, poses)
+        if results is None:
+            found = solve(self.description, self.elimination.candidates, poses)
+        else:
+            found = solve_from(self.description, self.elimination, results, poses)
         rows = np.flatnonzero(~found.is_complete)
-        for way in self.ways[1:]:
-            if len(rows):
-                found = self._by_another_way(found, way, poses, rows)
+        for way in self.ways[1 : 1 + _FURTHER_WAYS]:
+            if len(rows) and way.pose_kernel.is_compiled_for(len(rows)):
+                others = solve(self.description, way.candidates, poses[rows])
+                found = _with_another_way(found, rows, others)
+                rows = rows[~found.is_complete[rows]]
+        for way in self.ways:
+            if len(rows) and isinstance(way, CompiledGeneral):
+                others = solve(self.description, way.candidates_by_lapack, poses[rows])
+                found = _with_another_way(found, rows, others)
                 rows = rows[~found.is_complete[rows]]
         if len(rows):
             found = _with(found, rows, *self._from_beside(poses[rows]))
@@ -102,23 +128,6 @@ class SixJoints:
         if len(rows):
             found = _with(found, rows, *self._iterated(poses[rows], found, rows))
         return found
-
-    def _by_another_way(
-        self, found: Found, way: Elimination, poses: Array, rows: NDArray[np.intp]
-    ) -> Found:
-        """Return what is found, with the solutions of poses ``rows`` (M,) by another elimination added."""
-        others = solve(self.description, way, poses[rows])
-        before = found.counts[rows]
-        merged = _with(found, rows, others.q, others.owner)
-        # Where that one is complete, and its solutions lie at its roots, it knows their number.
-        is_known = others.is_complete & others.is_settled
-        merged.expected[rows[is_known]] = others.expected[is_known]
-        merged.is_exact[rows[is_known]] = True
-        # So do two ways whose roots nearly coincide, but which found the same solutions.
-        counts = merged.counts[rows]
-        is_same = others.is_exact & (before == counts) & (others.counts == counts)
-        merged.is_settled[rows[is_known | is_same]] = True
-        return merged
 
     def _from_beside(self, poses: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return solutions (K, 6) of poses (M, 16) by Newton's method from those of displaced poses, and their poses.
@@ -128,7 +137,7 @@ class SixJoints:
         q = []
         owner = []
         for displaced in _displaced(poses, Axes.of(self.description).scale):
-            beside = solve(self.description, self.elimination, displaced)
+            beside = solve(self.description, self.elimination.candidates, displaced)
             ends, closed = refined(self.description, beside.q, poses[beside.owner])
             q.append(ends[closed])
             owner.append(beside.owner[closed])
@@ -163,10 +172,11 @@ class SixJoints:
             )
             reached = found.valid[:, 0]
             before = np.bincount(owner, minlength=len(rows))
-            q, owner = distinct(
-                np.concatenate([q, found.q[reached, 0]]),
-                np.concatenate([owner, of_start[reached]]),
-            )
+            q = np.concatenate([q, found.q[reached, 0]])
+            owner = np.concatenate([owner, of_start[reached]])
+            kept = distinct(q, owner)
+            q = q[kept]
+            owner = owner[kept]
             # More than 16 are points of a curve of solutions.
             counts = np.bincount(owner, minlength=len(rows))[waiting]
             waiting = waiting[(counts > before[waiting]) & (counts <= MOST)]
@@ -207,26 +217,65 @@ def has_two_parallel(description: Description) -> bool:
     return description.kinds == "RRRRRR" and six_joints(description).two_parallel is not None
 
 
-def _with(found: Found, rows: NDArray[np.intp], more: Array, owner: NDArray[np.intp]) -> Found:
-    """Return solutions with others (K, 6) added; ``owner`` are indices of ``rows``, those of the poses, shape (K,)."""
+def _with(
+    found: Found,
+    rows: NDArray[np.intp],
+    more: Array,
+    owner: NDArray[np.intp],
+    may_be_singular: NDArray[np.bool_] | bool = True,
+) -> Found:
+    """Return solutions with others added.
+
+    Parameters
+    ----------
+    found
+        The solutions.
+    rows
+        Indices of the poses to which others are added, shape (M,).
+    more, owner, may_be_singular
+        The others, shape (K, 6), rad, their poses as indices of ``rows``, and whether they have not been shown to be
+        regular, shape (K,) each.
+    """
     is_delicate = found.is_delicate.copy()
     is_delicate[rows] = True
     is_asked = np.zeros(len(found.expected), dtype=bool)
     is_asked[rows] = True
     changes = is_asked[found.owner]
-    q, owners = distinct(
-        np.concatenate([found.q[changes], more]),
-        np.concatenate([found.owner[changes], rows[owner]]),
-    )
-    q = np.concatenate([found.q[~changes], q])
-    owners = np.concatenate([found.owner[~changes], owners])
+    q = np.concatenate([found.q[changes], more])
+    owners = np.concatenate([found.owner[changes], rows[owner]])
+    may = np.broadcast_to(may_be_singular, len(more))
+    may = np.concatenate([found.may_be_singular[changes], may])
+    kept = distinct(q, owners)
+    q = np.concatenate([found.q[~changes], q[kept]])
+    owners = np.concatenate([found.owner[~changes], owners[kept]])
+    may = np.concatenate([found.may_be_singular[~changes], may[kept]])
     order = np.argsort(owners, kind="stable")
     return replace(
         found,
         q=q[order],
         owner=owners[order],
+        may_be_singular=may[order],
         expected=found.expected.copy(),
         is_exact=found.is_exact.copy(),
         is_delicate=is_delicate,
         is_settled=found.is_settled.copy(),
     )
+
+
+def _with_another_way(found: Found, rows: NDArray[np.intp], others: Found) -> Found:
+    """Return what is found, with the solutions of poses ``rows`` (M,) by another elimination added."""
+    before = found.counts[rows]
+    merged = _with(found, rows, others.q, others.owner, others.may_be_singular)
+    # No solution is without a root, so that the smaller number of real roots counts.
+    are_exact = found.is_exact[rows] & others.is_exact
+    least = np.minimum(found.expected[rows], others.expected)
+    merged.expected[rows[are_exact]] = least[are_exact]
+    # Where that one is complete, and its solutions lie at its roots, it knows their number.
+    is_known = others.is_complete & others.is_settled
+    merged.expected[rows[is_known]] = others.expected[is_known]
+    merged.is_exact[rows[is_known]] = True
+    # So do two ways whose roots nearly coincide, but which found the same solutions.
+    counts = merged.counts[rows]
+    is_same = others.is_exact & (before == counts) & (others.counts == counts)
+    merged.is_settled[rows[is_known | is_same]] = True
+    return merged

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description
 from dhkit.kernels import Kernel
 from dhkit.kinematics.numeric import refined
+
+if TYPE_CHECKING:
+    from dhkit.kinematics.polynomial.pose_results import PoseProgram, PoseResults
 
 _CHUNK = 1_024
 """Poses that are solved together; their arrays take some 10 MB."""
@@ -54,6 +57,8 @@ class Candidates:
     """Shape (L, 6), near solutions, rad, in (-pi, pi]."""
     error: Array
     """Their errors, shape (L,), shares of the reach and rad."""
+    may_be_singular: NDArray[np.bool_]
+    """Whether they have not been shown to be regular, shape (L,)."""
     owner: NDArray[np.intp]
     """The pose of each, shape (L,), in ascending order."""
     root: NDArray[np.intp]
@@ -76,6 +81,8 @@ class Found:
     """Shape (K, 6), rad, those of a pose together."""
     owner: NDArray[np.intp]
     """Index of the pose of each, shape (K,), in ascending order."""
+    may_be_singular: NDArray[np.bool_]
+    """Whether they have not been shown to be regular, shape (K,)."""
     expected: NDArray[np.intp]
     """Number of real roots of each pose's polynomial, shape (N,); 1 if there are only some that are nearly real."""
     is_exact: NDArray[np.bool_]
@@ -118,59 +125,108 @@ def sorting_key(angles: Sequence[Any]) -> Any:
     return first + SAME_ANGLE * sum(x * 0.1**k for k, x in enumerate(others, start=1))
 
 
-def solve(description: Description, elimination: Elimination, poses: Array) -> Found:
-    """Return the solutions of poses, shape (N, 16), with orthonormal rotations, m."""
+def solve(
+    description: Description, candidates: Callable[[Array], Candidates], poses: Array
+) -> Found:
+    """Return the solutions of poses.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    candidates
+        Returns joint values at the roots of the polynomials of poses, as :meth:`Elimination.candidates`.
+    poses
+        Shape (N, 16), with orthonormal rotations, m.
+    """
+    return _solved(description, lambda some: candidates(poses[some]), poses)
+
+
+def solve_from(
+    description: Description, program: PoseProgram, results: PoseResults, poses: Array
+) -> Found:
+    """Return the solutions of poses at which an elimination's program has run.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    program, results
+        The elimination, and what it found.
+    poses
+        Shape (N, 16), with orthonormal rotations, m.
+    """
+    return _solved(
+        description, lambda some: program.candidates_of(results.at(some), poses[some]), poses
+    )
+
+
+def _solved(
+    description: Description, candidates: Callable[[slice], Candidates], poses: Array
+) -> Found:
+    """Return the solutions of poses (N, 16) from the candidates of chunks of them."""
     q = [np.empty((0, 6))]
     owner = [np.empty(0, dtype=np.intp)]
+    may_be_singular = [np.empty(0, dtype=bool)]
     expected = np.zeros(len(poses), dtype=np.intp)
     is_exact, is_delicate, is_settled = np.zeros((3, len(poses)), dtype=bool)
     for begin in range(0, len(poses), _CHUNK):
         some = slice(begin, begin + _CHUNK)
-        found = _solve(description, elimination, poses[some])
+        with np.errstate(all="ignore"):
+            near = candidates(some)
+        found = _closed(description, near, poses[some])
         q.append(found.q)
         owner.append(found.owner + begin)
+        may_be_singular.append(found.may_be_singular)
         expected[some] = found.expected
         is_exact[some] = found.is_exact
         is_delicate[some] = found.is_delicate
         is_settled[some] = found.is_settled
     return Found(
-        np.concatenate(q), np.concatenate(owner), expected, is_exact, is_delicate, is_settled
+        np.concatenate(q),
+        np.concatenate(owner),
+        np.concatenate(may_be_singular),
+        expected,
+        is_exact,
+        is_delicate,
+        is_settled,
     )
 
 
-def _solve(description: Description, elimination: Elimination, poses: Array) -> Found:
+def _closed(description: Description, found: Candidates, poses: Array) -> Found:
     """Return the solutions of a chunk of poses."""
-    with np.errstate(all="ignore"):
-        found = elimination.candidates(poses)
-        # False for errors that are no numbers, as are those of joint values that are none.
-        closed = found.error <= CLOSES
+    # False for errors that are no numbers, as are those of joint values that are none.
+    closed = found.error <= CLOSES
     q = found.q
+    may_be_singular = found.may_be_singular
     moved = np.flatnonzero(~closed)
     if len(moved):
         moved = moved[np.isfinite(q[moved]).all(axis=1)]
         q[moved], closed[moved] = refined(description, q[moved], poses[found.owner[moved]])
+        may_be_singular[moved] = True
 
     # Solutions of a pose that come from roots apart differ in that joint, unless they moved far from their roots.
     is_moved = np.zeros(len(poses), dtype=bool)
     is_moved[found.owner[moved]] = True
     is_doubtful = found.may_repeat | is_moved
-    q = q[closed]
-    owner = found.owner[closed]
-    root = found.root[closed]
-    is_at_root = found.error[closed] < _AT_ROOT
+    kept = np.flatnonzero(closed)
+    owner = found.owner[kept]
+    root = found.root[kept]
     is_doubtful[owner[1:][root[1:] == root[:-1]]] = True
     rows = np.flatnonzero(is_doubtful[owner])
     if len(rows):
-        is_one = np.ones(len(q), dtype=bool)
-        is_one[rows] = are_distinct(q[rows], owner[rows])
-        q = q[is_one]
-        owner = owner[is_one]
-        is_at_root = is_at_root[is_one]
+        is_one = np.ones(len(kept), dtype=bool)
+        is_one[rows] = are_distinct(q[kept[rows]], owner[rows])
+        kept = kept[is_one]
+    owner = found.owner[kept]
+    is_at_root = found.error[kept] < _AT_ROOT
     # What Newton's method moved may be singular as well.
     is_delicate = found.is_delicate | is_moved
     is_exact = found.error_of_polynomial < INEXACT
     is_settled = np.bincount(owner[is_at_root], minlength=len(poses)) >= found.expected
-    return Found(q, owner, found.expected, is_exact, is_delicate, is_settled)
+    return Found(
+        q[kept], owner, may_be_singular[kept], found.expected, is_exact, is_delicate, is_settled
+    )
 
 
 def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -199,11 +255,11 @@ def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:
     return is_new
 
 
-def distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Return solutions (K, n), rad, without those that another one of the same pose equals, and their poses (K,).
+def distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return indices of solutions (K, 6), rad, of poses (K,), without those that another one of the same pose equals.
 
-    Those of a pose are together, and poses in ascending order.
+    Of equal ones the first is left. Those of a pose are together, and poses in ascending order.
     """
     order = np.argsort(owner, kind="stable")
-    rows = order[are_distinct(q[order], owner[order])]
-    return q[rows], owner[rows]
+    rows: NDArray[np.intp] = order[are_distinct(q[order], owner[order])]
+    return rows

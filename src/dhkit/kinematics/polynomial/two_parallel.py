@@ -125,7 +125,10 @@ class TwoParallel:
 
     def candidates(self, poses: Array) -> Candidates:
         """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
-        results = PoseResults.of(self, poses)
+        return self.candidates_of(PoseResults.of(self, poses), poses)
+
+    def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:
+        """Return joint values at the roots that the program found at poses, shape (N, 16), m."""
         found = results.candidates()
         also = results.more[results.is_near]
         if not (also > 0.0).any():
