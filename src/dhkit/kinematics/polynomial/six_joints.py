@@ -97,8 +97,8 @@ class SixJoints:
         """Return the solutions of poses, with orthonormal rotations.
 
         Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more by
-        eliminating other joints, then by LAPACK, which finds two solutions at one root, then from the solutions of
-        poses beside them, where the roots lie apart, and then by iteration from random starts.
+        eliminating other joints, and by LAPACK, which finds two solutions at one root. Unless these agree, solutions are
+        searched for from those of poses beside them, where the roots lie apart, and then from random starts.
 
         Parameters
         ----------
@@ -122,6 +122,7 @@ class SixJoints:
                 others = solve(self.description, way.candidates_by_lapack, poses[rows])
                 found = _with_another_way(found, rows, others)
                 rows = rows[~found.is_complete[rows]]
+        rows = rows[~found.is_confirmed[rows]]
         if len(rows):
             found = _with(found, rows, *self._from_beside(poses[rows]))
             rows = rows[~found.is_complete[rows]]
@@ -259,6 +260,7 @@ def _with(
         is_exact=found.is_exact.copy(),
         is_delicate=is_delicate,
         is_settled=found.is_settled.copy(),
+        confirmed=found.confirmed.copy(),
     )
 
 
@@ -278,4 +280,5 @@ def _with_another_way(found: Found, rows: NDArray[np.intp], others: Found) -> Fo
     counts = merged.counts[rows]
     is_same = others.is_exact & (before == counts) & (others.counts == counts)
     merged.is_settled[rows[is_known | is_same]] = True
+    merged.confirmed[rows] = np.where(is_same, found.confirmed[rows] + 1, 0)
     return merged
