@@ -28,13 +28,12 @@ from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.pose_results import PoseProgram, PoseResults, output_sizes
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import (
-    INEXACT,
     SAME_ANGLE,
     SORTED_BY,
     are_distinct,
     sorting_key,
 )
-from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, NEAR_SOLUTION, NONE, ROOTS
+from dhkit.kinematics.polynomial.trigonometric import ROOTS
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
@@ -197,22 +196,16 @@ def _columns(table: NDArray[Any], is_kept: NDArray[np.bool_], filling: float) ->
 
 def _flags_and_counts(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
     """Return the flags (N, 16) of roots with joint values (N, 16, 6), and the numbers of solutions, 0 if not sure."""
-    kinds, are_outside = np.moveaxis(outputs[0].reshape(len(q), ROOTS, 2), -1, 0)
-    posed = outputs[2][:, 0]
-    error = outputs[3][:, 0]
-    is_root = kinds != NONE
-    counts: NDArray[np.intp] = np.count_nonzero(is_root, axis=1)
-    # Complex roots come in pairs: an odd number is not all. False for NaN.
-    is_sure = (posed == 1.0) & (error < INEXACT) & (counts % 2 == 0)
-    is_sure &= ~(kinds == DOUBTFUL).any(axis=1)
-    near = np.flatnonzero(is_sure & (kinds == NEAR_SOLUTION).any(axis=1))
+    are_outside, _, verdict, _ = outputs
+    # NaN, of matrices that are not finite, is not above 0.
+    known = np.where(verdict[:, 0] > 0.0, verdict[:, 0], 0.0)
+    counts = known.astype(np.intp)
+    near = np.flatnonzero(known != counts)
     if len(near):
-        owner, place = np.nonzero(is_root[near])
+        owner, place = np.nonzero(np.arange(ROOTS) < counts[near, None])
         is_one = are_distinct(q[near[owner], place], owner)
-        is_sure[near[owner[~is_one]]] = False
-    counts[~is_sure] = 0
-
-    return np.where(are_outside == 1.0, _OUT_OF_LIMITS, np.uint8(0)), counts
+        counts[near[owner[~is_one]]] = 0
+    return (are_outside == 1.0).view(np.uint8) * _OUT_OF_LIMITS, counts
 
 
 def _solved_with_care(

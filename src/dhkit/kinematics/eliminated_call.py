@@ -16,8 +16,8 @@ from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.eliminated import branch_names, elimination_kernels, has_curves
 from dhkit.kinematics.polynomial.pose_results import PoseProgram
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import INEXACT, are_distinct
-from dhkit.kinematics.polynomial.trigonometric import DOUBTFUL, NEAR_SOLUTION, NONE, ROOTS
+from dhkit.kinematics.polynomial.solve import are_distinct
+from dhkit.kinematics.polynomial.trigonometric import ROOTS
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
 log = logging.getLogger(__name__)
@@ -40,8 +40,8 @@ class EliminatedPoseCall:
         numbers = description.numbers
         middle = np.arange(1.0, description.n + 1.0) / description.n
         self._description = description
-        # What is known of the roots, whether T is a pose, and the error of its polynomial; details are left out.
-        self._packed = struct.Struct(f"{2 * ROOTS}d{8 * arm.details * ROOTS}xdd")
+        # Which solutions are outside their limits, and the number of solutions; the roots' details are left out.
+        self._packed = struct.Struct(f"{ROOTS}d{8 * arm.details * ROOTS}xd8x")
         self._shared: dict[int, dict[str, object]] = {}
         self._call: FastCall = SingleCall(
             arm.pose_kernel,
@@ -110,22 +110,16 @@ class EliminatedPoseCall:
         if found is None:
             return None
         q, packed = found
-        *roots, posed, error = self._packed.unpack(packed)
-        kinds = roots[::2]
-        # False for NaN.
-        is_known = posed == 1.0 and error < INEXACT
-        if not is_known or DOUBTFUL in kinds:
+        *are_outside, verdict = self._packed.unpack(packed)
+        # The ordinary way says whether a pose without solutions is out of reach. False for NaN.
+        if not verdict > 0.0:
             return None
-        count = ROOTS - kinds.count(NONE)
-        # Complex roots come in pairs. The ordinary way says whether a pose without solutions is out of reach.
-        if count == 0 or count % 2:
+        count = int(verdict)
+        if verdict != count and not _are_different(q[:count]):
             return None
-        if NEAR_SOLUTION in kinds and not _are_different(q[:count]):
-            return None
-        are_outside = roots[1 : 2 * count : 2]
         flags = bytes(count)
         if 1.0 in are_outside:
-            flags = bytes([_OUTSIDE if outside else _INSIDE for outside in are_outside])
+            flags = bytes([_OUTSIDE if outside else _INSIDE for outside in are_outside[:count]])
         return q[:count].copy(), flags
 
     def _shared_by(self, count: int) -> dict[str, object]:

@@ -36,19 +36,19 @@ from dhkit.kinematics.closed_form.spherical_shoulder import (
     spherical_shoulder_formulas,
 )
 from dhkit.kinematics.limit_symbols import ArmSymbols, wave_root
-from dhkit.kinematics.polynomial.extension import Extension, Root
-from dhkit.kinematics.polynomial.pose_steps import (
+from dhkit.kinematics.polynomial.estimate_steps import (
     PolynomialSource,
     estimate_steps,
-    place_in_order,
+    total_of,
 )
+from dhkit.kinematics.polynomial.extension import Extension, Root
+from dhkit.kinematics.polynomial.pose_steps import place_in_order
 from dhkit.kinematics.polynomial.roots_program import (
     BEYOND as NO_ANGLE,
     coefficients,
     complex_of,
     nearly_real,
     polynomial_of,
-    sizes_of,
 )
 from dhkit.kinematics.redundant import JOINTS
 from dhkit.kinematics.turn_parts import (
@@ -216,7 +216,7 @@ def _known_coefficients(parameters: _SX, name: str) -> PipelineStep:
     numbers, error = coefficients(values, degree)
     outputs = {
         f"{name}_numbers": numbers,
-        f"{name}_sizes": ca.vertcat(*sizes_of(polynomial_of(numbers, degree))),
+        f"{name}_total": total_of(numbers, degree),
         f"{name}_error": error,
     }
     graph = Graph.of(f"{name}_coefficients", {"parameters": parameters, "values": values}, outputs)
@@ -229,13 +229,13 @@ def _root_steps(parameters: _SX, name: str, lane: int) -> tuple[PipelineStep, ..
     source = PolynomialSource(
         _DEGREES[name],
         f"{name}_numbers",
-        f"{name}_sizes",
+        f"{name}_total",
         lane,
         _LANES,
         f"{own}_x",
         f"{own}_y",
     )
-    every_number, numbers = source.symbol("numbers")
+    every_number, numbers = source.symbol("numbers", source.coefficients)
     errors = ca.SX.sym("errors", _LANES)
     x = ca.SX.sym("x")
     y = ca.SX.sym("y")

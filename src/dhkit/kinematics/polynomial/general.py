@@ -124,7 +124,7 @@ class CompiledGeneral:
             return self.lapack.candidates(poses)
         return self.candidates_of(PoseResults.of(self, poses), poses)
 
-    def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:  # noqa: ARG002
+    def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:
         """Return joint values at the roots that the program found at poses; of a root with two solutions just one."""
         return results.candidates()
 

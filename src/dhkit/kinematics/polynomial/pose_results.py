@@ -38,7 +38,7 @@ class PoseProgram(Protocol):
 
 def output_sizes(details: int) -> tuple[int, ...]:
     """Return the numbers of entries of a program's outputs, with a number of details of a root."""
-    return (6 * ROOTS, 2 * ROOTS, details * ROOTS, 1, 1)
+    return (6 * ROOTS, ROOTS, details * ROOTS, 1, 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
-from itertools import accumulate
 from typing import Any, TypeAlias
 
 import casadi as ca
 
+from dhkit.kinematics.polynomial.estimate_steps import (
+    PolynomialSource,
+    estimate_steps,
+    total_of,
+)
 from dhkit.kinematics.polynomial.extension import Extension
 from dhkit.kinematics.polynomial.roots_program import (
     BEYOND,
-    CONVERGED,
-    FIRST_ANGLE,
-    FIRST_RADII,
-    MOST_STEPS,
     NEAR_ROOTS,
-    aberth_step,
     coefficients,
     complex_of,
     nearly_real,
     polynomial_of,
-    sizes_of,
     square_of_distance,
 )
-from dhkit.kinematics.polynomial.solve import CLOSES, SAME_ANGLE, SORTED_BY, sorting_key
+from dhkit.kinematics.polynomial.solve import CLOSES, INEXACT, SAME_ANGLE, SORTED_BY, sorting_key
 from dhkit.kinematics.polynomial.trigonometric import (
     DEGREE,
     DOUBTFUL,
@@ -43,16 +39,16 @@ from dhkit.symbolic import Graph, PipelineStep
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
-RESULTS = ("sorted_q", "sorted_summary", "sorted_details", "posed", "error")
-"""Outputs of a pose's program; the roots are sorted by their joint values, and those of the kind ``NONE`` are the last.
+RESULTS = ("sorted_q", "sorted_is_outside", "sorted_details", "verdict", "error")
+"""Outputs of a pose's program; the roots are sorted by their joint values, and those without a solution are the last.
 
 - joint values, 16 times 6, rad;
-- summary, 16 times 2: what is known of the root (``NONE``, ``SOLUTION``, ``NEAR_SOLUTION`` or ``DOUBTFUL``), and
-  whether a joint is outside its limits;
+- whether a joint is outside its limits, 16 times;
 - details of the root, 16 times 5 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if its
   solution may be singular or that of another root; the error of its joint values; its angle, rad; and more by the way
   of elimination;
-- ``posed``, whether T is a pose;
+- ``verdict``, the number of solutions if all are known, plus 0.5 if some lie so near that they may be the same one; 0
+  if they are not known, or T is no pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
 BESIDE = 1.0
@@ -65,11 +61,9 @@ _AT_ROOT = 1e-5
 """Half the distance of a solution from its root, rad, above which it may be that of another root."""
 _COEFFICIENTS = 2 * DEGREE + 1
 _OF_ROOT = ("angle", "is_tried", "is_real", "closeness")
-_OF_SOLUTION = ("q", "summary", "details")
+_OF_SOLUTION = ("q", "is_outside", "details", "kind")
 _BELOW_ALL = 8.0
 """More than any number by which solutions are sorted, whose largest are near pi."""
-_TOGETHER = 8
-"""Numbers whose reciprocals are computed together."""
 
 
 def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
@@ -120,6 +114,7 @@ def solving_steps(
         _sorted(
             parameters, "sorted_solutions", "key", {name: sizes[name] for name in _OF_SOLUTION}
         ),
+        _verdict(parameters),
     )
 
 
@@ -127,97 +122,10 @@ def _known_coefficients(parameters: _SX) -> PipelineStep:
     """Return the step from values to coefficients, and the largest one beyond the degree."""
     values = ca.SX.sym("values", SAMPLES)
     numbers, error = coefficients(values, DEGREE)
-    sizes = ca.vertcat(*sizes_of(polynomial_of(numbers, DEGREE)))
     inputs = {"parameters": parameters, "values": values}
-    outputs = {"numbers": numbers, "sizes": sizes, "error": error}
+    outputs = {"numbers": numbers, "total": total_of(numbers, DEGREE), "error": error}
     graph = Graph.of("coefficients", inputs, outputs)
     return PipelineStep(graph, shared={"values": "value"})
-
-
-@dataclass(frozen=True)
-class PolynomialSource:
-    """Where a pipeline has a trigonometric polynomial, and the estimates of its roots.
-
-    The coefficients may be those of one lane of several: then they are every ``lanes``-th number.
-    """
-
-    degree: int
-    numbers: str = "numbers"
-    sizes: str = "sizes"
-    """Outputs with the coefficients, and with their absolute values."""
-    lane: int = 0
-    lanes: int = 1
-    x: str = "x"
-    y: str = "y"
-    """Outputs with the real and the imaginary part of each root."""
-
-    @property
-    def roots(self) -> int:
-        """The number of roots."""
-        return 2 * self.degree
-
-    def symbol(self, name: str) -> tuple[_SX, _SX]:
-        """Return the symbol of all numbers of an input, and those of this polynomial."""
-        every = ca.SX.sym(name, (2 * self.degree + 1) * self.lanes)
-        return every, every[self.lane :: self.lanes]
-
-
-def estimate_steps(parameters: _SX, source: PolynomialSource) -> tuple[PipelineStep, ...]:
-    """Return the steps that find all roots of a polynomial by Aberth's method, a root in each lane.
-
-    Parameters
-    ----------
-    parameters
-        Symbols of the pipeline's parameters.
-    source
-        The polynomial.
-    """
-    return _first_estimates(parameters, source), _better_estimates(parameters, source)
-
-
-def _first_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
-    """Return the step with the first estimates of the roots, beside the unit circle inside and outside in turn."""
-    index = ca.SX.sym("index")
-    is_odd = index - 2.0 * ca.floor(index / 2.0) > 0.5
-    radius = ca.if_else(is_odd, FIRST_RADII[1], FIRST_RADII[0])
-    angle = FIRST_ANGLE + index * (math.tau / source.roots)
-    inputs = {"parameters": parameters, "index": index}
-    outputs = {source.x: radius * ca.cos(angle), source.y: radius * ca.sin(angle)}
-    graph = Graph.of("first_estimates", inputs, outputs)
-    return PipelineStep(graph, source.roots, each={"index": "index"})
-
-
-def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
-    """Return Aberth's step for each root, which is repeated until none moves."""
-    every_number, numbers = source.symbol("numbers")
-    every_size, sizes = source.symbol("sizes")
-    index, root, others = _root_and_others(source.roots)
-    apart = [root - other for other in others]
-    squares = []
-    for j, z in enumerate(apart):
-        is_other = index != float(j)
-        squares.append(ca.if_else(is_other, z.x * z.x + z.y * z.y, 1.0))
-    # 1 / z = (x - i y) / (x^2 + y^2), and 0 of the root itself, whose x and y are 0.
-    repulsion = complex_of(ca.SX(0.0), ca.SX(0.0))
-    for z, over in zip(apart, _reciprocals(squares), strict=True):
-        repulsion = repulsion + complex_of(z.x * over, -z.y * over)
-    polynomial = polynomial_of(numbers, source.degree)
-    moved, step = aberth_step(polynomial, ca.vertsplit(sizes), root, repulsion)
-    inputs = {
-        "parameters": parameters,
-        "numbers": every_number,
-        "sizes": every_size,
-        **_inputs_of(index, root, others),
-    }
-    goes_on = ca.if_else(step >= CONVERGED, 1.0, 0.0)
-    outputs = {source.x: moved.x, source.y: moved.y, "goes_on": goes_on}
-    return PipelineStep(
-        Graph.of("better_estimates", inputs, outputs),
-        source.roots,
-        each={"index": "index", "x": source.x, "y": source.y},
-        shared={"numbers": source.numbers, "sizes": source.sizes, "xs": source.x, "ys": source.y},
-        most=MOST_STEPS,
-    )
 
 
 def _angles(parameters: _SX) -> PipelineStep:
@@ -259,6 +167,31 @@ def _angles(parameters: _SX) -> PipelineStep:
         ROOTS,
         each={"index": "index"},
         shared={"numbers": "numbers", "error": "error", "first": "first", "xs": "x", "ys": "y"},
+    )
+
+
+def _verdict(parameters: _SX) -> PipelineStep:
+    """Return the step that tells whether all solutions are known, as ``verdict`` of :data:`RESULTS`."""
+    kinds = ca.SX.sym("kinds", ROOTS)
+    posed = ca.SX.sym("posed")
+    error = ca.SX.sym("error")
+    every = ca.vertsplit(kinds)
+
+    def number_of(are_so: Iterable[_SX]) -> _SX:
+        return sum((ca.if_else(is_so, 1.0, 0.0) for is_so in are_so), ca.SX(0.0))
+
+    count = number_of(kind != NONE for kind in every)
+    # Complex roots come in pairs: an odd number is not all.
+    is_even = count == 2.0 * ca.floor(count / 2.0)
+    is_known = ca.logic_and(posed == 1.0, error < INEXACT)
+    are_single = number_of(kind == DOUBTFUL for kind in every) == 0.0
+    is_sure = ca.logic_and(ca.logic_and(is_known, are_single), is_even)
+    are_near = number_of(kind == NEAR_SOLUTION for kind in every) > 0.0
+    verdict = ca.if_else(is_sure, count + ca.if_else(are_near, 0.5, 0.0), 0.0)
+    inputs = {"parameters": parameters, "kinds": kinds, "posed": posed, "error": error}
+    return PipelineStep(
+        Graph.of("verdict", inputs, {"verdict": verdict}),
+        shared={"kinds": "sorted_kind", "posed": "posed", "error": "error"},
     )
 
 
@@ -372,31 +305,13 @@ def known_solutions(
     details = [is_tried, is_real, care, *of_tried]
     outputs = {
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
-        "summary": ca.vertcat(kind, at_tried(is_outside)),
+        "is_outside": at_tried(is_outside),
         "details": ca.vertcat(*details),
+        "kind": kind,
         # Roots without a solution come last, with the key 0, as skipped ones have: all other keys are negative.
         "key": ca.if_else(kind != NONE, at_tried(order) - _BELOW_ALL, 0.0),
     }
     return Graph.of("solutions", inputs, outputs)
-
-
-def _reciprocals(numbers: list[_SX]) -> list[_SX]:
-    """Return 1 / x of positive numbers, with one division for each eight: a division takes as long as some 16 products.
-
-    With the products b_k of those before x_k and a_k of those from x_k on, 1 / x_k = b_k a_(k+1) / (b_h a_h) for any h.
-    """
-    reciprocals: list[_SX] = []
-    for begin in range(0, len(numbers), _TOGETHER):
-        part = numbers[begin : begin + _TOGETHER]
-        # CasADi would make 1 / x of y / (x y) where it sees the same y. It does not see the product of all in that of
-        # two halves.
-        one = ca.SX(1.0)
-        before = list(accumulate(part, operator.mul, initial=one))
-        after = list(accumulate(reversed(part), operator.mul, initial=one))[::-1]
-        half = len(part) // 2
-        product = before[half] * after[half]
-        reciprocals += [before[k] * after[k + 1] / product for k in range(len(part))]
-    return reciprocals
 
 
 def _root_and_others(count: int) -> tuple[_SX, Extension, list[Extension]]:

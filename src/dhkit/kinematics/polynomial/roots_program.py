@@ -30,7 +30,7 @@ CONVERGED = 1e-7
 FIRST_RADII = (0.95, 1.05)
 FIRST_ANGLE = 0.4
 """The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps would keep both."""
-_ROUNDING = 4e-15
+ROUNDING = 4e-15
 """A value below this share of the sum of the terms' absolute values is rounding: its estimate is a root."""
 _NEARLY_REAL = 3e-2
 """Largest imaginary part, rad, of a root that is tried: rounding of 1e-15 in the coefficients moves a root of
@@ -43,6 +43,7 @@ _UNKNOWN = 100.0
 with offset wrists hardly any pose has such a complex root, of arms whose wrists are almost spherical most have."""
 _MARGIN = 1e4
 """Factor of that error, for roots that are tried."""
+_PARTS = 4
 NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
 
@@ -170,7 +171,7 @@ def aberth_step(
     repulsion
         The sum of 1 / (z - z_j) over the other estimates.
     """
-    p, slope = _value_and_slope(polynomial, root)
+    p, slope = value_and_slope(polynomial, root)
     step = p * (slope - p * repulsion).inverse
     length = ca.sqrt(step.x * step.x + step.y * step.y)
     is_finite = length < 1e300
@@ -178,7 +179,7 @@ def aberth_step(
 
     radius = ca.sqrt(root.x * root.x + root.y * root.y)
     largest = reduce(lambda value, size: value * radius + size, sizes)
-    is_root = ca.fabs(p.x) + ca.fabs(p.y) < _ROUNDING * largest
+    is_root = ca.fabs(p.x) + ca.fabs(p.y) < ROUNDING * largest
     return root - step, ca.if_else(is_root, 0.0, length / radius)
 
 
@@ -226,12 +227,12 @@ def nearly_real(polynomial: list[Extension], root: Extension, error: SX) -> tupl
     # ln(square) / 2 of a square near 1, up to its cube.
     height = ca.fabs((square - 1.0) / (square + 1.0))
     # f = p / z^degree and |z| is about 1: |f'| = |p'| at a root, and f is height f' at the real angle beside it.
-    _, slope = _value_and_slope(polynomial, root)
+    _, slope = value_and_slope(polynomial, root)
     value = height * ca.sqrt(slope.x * slope.x + slope.y * slope.y)
     is_tried = ca.logic_and(height < _NEARLY_REAL, value < _MARGIN * tolerance)
     angle = ca.if_else(is_tried, ca.atan2(root.y, root.x), BEYOND)
     # Where |f| is that small over a whole interval, the roots in it may be anywhere.
-    is_unknown = ca.fabs(_at_real_angle(polynomial, root)) < _UNKNOWN * ca.fmax(error, _ROUNDING)
+    is_unknown = ca.fabs(_at_real_angle(polynomial, root)) < _UNKNOWN * ca.fmax(error, ROUNDING)
     return angle, height, ca.if_else(ca.logic_or(value < tolerance, is_unknown), 1.0, 0.0)
 
 
@@ -266,17 +267,28 @@ def polynomial_of(numbers: SX, degree: int) -> list[Extension]:
     return [*upper, middle, *lower]
 
 
-def _value_and_slope(polynomial: list[Extension], x: Extension) -> tuple[Extension, Extension]:
-    """Return the value of a polynomial of even degree, highest coefficient first, and that of its derivative.
+def value_and_slope(polynomial: list[Extension], x: Extension) -> tuple[Extension, Extension]:
+    """Return the value of a polynomial, highest coefficient first, and that of its derivative.
 
-    With w = x^2 and p(x) = e(w) + x o(w) the slope is 2 x e'(w) + o(w) + 2 w o'(w). The chains of sums and products are
-    half as long as Horner's for x, and the processor works on both at a time.
+    With w = x^4 and p(x) = p_0(w) + x p_1(w) + x^2 p_2(w) + x^3 p_3(w) the slope is
+
+        p_1 + 2 x p_2 + 3 x^2 p_3 + 4 x^3 (p_0' + x p_1' + x^2 p_2' + x^3 p_3').
+
+    The chains of sums and products are a fourth as long as Horner's for x, and the processor works on all at a time.
     """
-    w = x * x
-    even, slope_of_even = _horner(polynomial[::2], w)
-    odd, slope_of_odd = _horner(polynomial[1::2], w)
-    slope = (x * slope_of_even + w * slope_of_odd) * 2.0 + odd
-    return even + x * odd, slope
+    lowest = polynomial[::-1]
+    square = x * x
+    cube = square * x
+    w = square * square
+    both = [_horner(lowest[k::_PARTS][::-1], w) for k in range(_PARTS) if len(lowest) > k]
+    value, inner = both[0]
+    for (part, slope), power in zip(both[1:], [x, square, cube], strict=False):
+        value = _product_and(value, part, power)
+        inner = _product_and(inner, slope, power)
+    outer = both[1][0]
+    for k, (part, power) in enumerate(zip([x[0] for x in both[2:]], [x, square], strict=False), 2):
+        outer = _product_and(outer, part, power * float(k))
+    return value, _product_and(outer, inner, cube * 4.0)
 
 
 def _horner(polynomial: list[Extension], x: Extension) -> tuple[Extension, Extension]:
@@ -284,6 +296,11 @@ def _horner(polynomial: list[Extension], x: Extension) -> tuple[Extension, Exten
     value = polynomial[0]
     slope = value * 0.0
     for coefficient in polynomial[1:]:
-        slope = slope * x + value
-        value = value * x + coefficient
+        slope = _product_and(value, slope, x)
+        value = _product_and(coefficient, value, x)
     return value, slope
+
+
+def _product_and(c: Extension, a: Extension, b: Extension) -> Extension:
+    """Return c + a b, as two fused products and sums for each part."""
+    return complex_of((c.x + a.x * b.x) - a.y * b.y, (c.y + a.x * b.y) + a.y * b.x)

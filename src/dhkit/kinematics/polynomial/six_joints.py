@@ -97,8 +97,8 @@ class SixJoints:
         """Return the solutions of poses, with orthonormal rotations.
 
         Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more by
-        eliminating other joints, and by LAPACK, which finds two solutions at one root. Unless these agree, solutions are
-        searched for from those of poses beside them, where the roots lie apart, and then from random starts.
+        eliminating other joints, and by LAPACK, which finds two solutions at one root. Unless these agree, solutions
+        are searched for from those of poses beside them, where the roots lie apart, and then from random starts.
 
         Parameters
         ----------

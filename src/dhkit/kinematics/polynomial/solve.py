@@ -116,8 +116,9 @@ class Found:
     def is_confirmed(self) -> NDArray[np.bool_]:
         """Whether two more eliminations have found the same solutions of a pose, an even number, shape (N,)."""
         counts = self.counts
-        is_same: NDArray[np.bool_] = self.confirmed >= _CONFIRMATIONS
-        return is_same & (counts > 0) & (counts % 2 == 0)
+        is_possible = (counts > 0) & (counts % 2 == 0)
+        confirmed: NDArray[np.bool_] = is_possible & (self.confirmed >= _CONFIRMATIONS)
+        return confirmed
 
     @property
     def counts(self) -> NDArray[np.intp]:

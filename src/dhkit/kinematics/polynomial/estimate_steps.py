@@ -1,0 +1,298 @@
+"""Steps of a pipeline to all roots of a trigonometric polynomial at the same time, a root in each lane of vectors.
+
+An estimate z moves by
+
+    N / (1 - N sum_j 1 / (z - u_j)),    N = p(z) / p'(z),
+
+which is Newton's step for p over the product of all other z - u_j (Aberth 1973, Math. Comp. 27). The others count as at
+u_j = z_j - N_j, where Newton's method would take them next: steps then shrink by their fourth powers instead of their
+cubes (Nourein 1977, An improvement on two iteration methods for simultaneous determination of the zeros of a
+polynomial, Int. J. Comput. Math. 6). Of long steps of Newton's method a part is foreseen, u = z - N / s. The sum over
+all roots, the own one too, needs no exception, and has the term s / N more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+from dhkit.kinematics.polynomial.extension import Extension
+from dhkit.kinematics.polynomial.roots_program import (
+    CONVERGED,
+    FIRST_ANGLE,
+    FIRST_RADII,
+    MOST_STEPS,
+    ROUNDING,
+    complex_of,
+    polynomial_of,
+    value_and_slope,
+)
+from dhkit.symbolic import Graph, PipelineStep
+
+_SX: TypeAlias = Any
+"""A CasADi SX scalar or matrix."""
+_LARGEST_STEP = 0.05
+"""Newton's steps that are longer than this share of |z| are not foreseen: far from a root they lead anywhere."""
+_SHORTER = 32.0
+"""The number s of such steps."""
+_SURELY_COMPLEX = 0.02
+"""Steps below this share of the distance to the unit circle do not matter: the root is not on it."""
+_INFINITE = 1e300
+_STATE = ("z_x", "z_y", "newton_x", "newton_y", "is_short")
+"""What an estimate's next step follows from, besides the other estimates."""
+_SUMS = 4
+"""Number of sums that the processor computes at the same time."""
+_TOGETHER = 8
+"""Numbers whose reciprocals are computed together."""
+
+
+@dataclass(frozen=True)
+class PolynomialSource:
+    """Where a pipeline has a trigonometric polynomial, and the estimates of its roots.
+
+    The coefficients may be those of one lane of several: then they are every ``lanes``-th number.
+    """
+
+    degree: int
+    numbers: str = "numbers"
+    total: str = "total"
+    """Outputs with the coefficients, and with the sum of their absolute values, see :func:`total_of`."""
+    lane: int = 0
+    lanes: int = 1
+    x: str = "x"
+    y: str = "y"
+    """Outputs with the real and the imaginary part of each root."""
+
+    @property
+    def roots(self) -> int:
+        """The number of roots."""
+        return 2 * self.degree
+
+    def symbol(self, name: str, size: int) -> tuple[_SX, _SX]:
+        """Return the symbol of all numbers of an input, and those of this polynomial, as many as ``size``."""
+        every = ca.SX.sym(name, size * self.lanes)
+        return every, every[self.lane :: self.lanes]
+
+    @property
+    def coefficients(self) -> int:
+        """The number of coefficients' real and imaginary parts."""
+        return 2 * self.degree + 1
+
+    def own(self, name: str) -> str:
+        """Return the name of an output with the state of the iteration."""
+        return f"{self.x}_{name}"
+
+
+def total_of(numbers: _SX, degree: int) -> _SX:
+    """Return the sum of the absolute values of a polynomial's coefficients, or somewhat more."""
+    return sum(ca.fabs(c.x) + ca.fabs(c.y) for c in polynomial_of(numbers, degree))
+
+
+def estimate_steps(parameters: _SX, source: PolynomialSource) -> tuple[PipelineStep, ...]:
+    """Return the steps that find all roots of a polynomial.
+
+    Parameters
+    ----------
+    parameters
+        Symbols of the pipeline's parameters.
+    source
+        The polynomial.
+    """
+    return _first_estimates(parameters, source), _better_estimates(parameters, source)
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    """An estimate of a root, and Newton's step from there."""
+
+    z: Extension
+    newton: Extension
+    is_short: _SX
+    """Whether Newton's step is short, so that it is foreseen."""
+    is_root: _SX
+    """Whether the value is 0 up to rounding, as it is in a whole neighbourhood of a double root."""
+
+    @classmethod
+    def at(cls, z: Extension, polynomial: list[Extension], total: _SX) -> _Estimate:
+        """Return an estimate.
+
+        Parameters
+        ----------
+        z
+            Where it is.
+        polynomial, total
+            Coefficients, highest first, and the sum of their absolute values.
+        """
+        p, slope = value_and_slope(polynomial, z)
+        newton = _finite(p * slope.inverse)
+        square = _square(z)
+        is_short = _square(newton) < _LARGEST_STEP**2 * square
+        # |p| <= total max(1, |z|)^(2 degree), and its rounding is a share of that.
+        largest = total * _power(ca.fmax(1.0, square), len(polynomial) // 2)
+        return cls(z, newton, is_short, ca.fabs(p.x) + ca.fabs(p.y) < ROUNDING * largest)
+
+    @property
+    def foreseen(self) -> Extension:
+        """The number u, which is the root if Newton's step is short."""
+        return self.z - self.newton * ca.if_else(self.is_short, 1.0, 1.0 / _SHORTER)
+
+    def step(self, repulsion: Extension) -> Extension:
+        """Return the step to subtract, with the sum of 1 / (z - u_j) over the others."""
+        one = complex_of(ca.SX(1.0), ca.SX(0.0))
+        return _finite(self.newton * (one - self.newton * repulsion).inverse)
+
+    def step_of_all(self, repulsion: Extension) -> Extension:
+        """Return the step to subtract, with the sum of 1 / (z - u_j) over all."""
+        own = complex_of(ca.if_else(self.is_short, 2.0, 1.0 + _SHORTER), ca.SX(0.0))
+        return _finite(self.newton * (own - self.newton * repulsion).inverse)
+
+    def outputs(self, source: PolynomialSource) -> dict[str, _SX]:
+        """Return the state of the iteration, as outputs of a step."""
+        root = self.foreseen
+        return {
+            source.own("z_x"): self.z.x,
+            source.own("z_y"): self.z.y,
+            source.own("newton_x"): self.newton.x,
+            source.own("newton_y"): self.newton.y,
+            source.own("is_short"): ca.if_else(self.is_short, 1.0, 0.0),
+            source.x: root.x,
+            source.y: root.y,
+        }
+
+
+def _first_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
+    """Return the step with the first estimates of the roots, beside the unit circle inside and outside in turn.
+
+    They are the roots of (z^n - r^n a) (z^n + R^n a) with the degree n, the radii r and R and |a| = 1. Half the ratio
+    of the second derivative to the first is the sum of 1 / (z - z_j), here
+
+        ((n - 1) / 2 + n r^n / (r^n + R^n)) / z
+
+    at the inner ones, and the same with R^n above at the outer ones. A step by Aberth's method follows.
+    """
+    n = source.degree
+    symbols = _Symbols.of(parameters, source)
+    index = ca.SX.sym("index")
+    is_odd = index - 2.0 * ca.floor(index / 2.0) > 0.5
+    radius = ca.if_else(is_odd, FIRST_RADII[1], FIRST_RADII[0])
+    angle = FIRST_ANGLE + index * (math.tau / source.roots)
+    z = complex_of(radius * ca.cos(angle), radius * ca.sin(angle))
+    inner, outer = ((n - 1) / 2 + n * r**n / sum(R**n for R in FIRST_RADII) for r in FIRST_RADII)
+    repulsion = z.inverse * ca.if_else(is_odd, outer, inner)
+
+    moved = symbols.estimate(z - symbols.estimate(z).step(repulsion))
+    inputs = {**symbols.inputs, "index": index}
+    graph = Graph.of("first_estimates", inputs, moved.outputs(source))
+    return PipelineStep(graph, source.roots, each={"index": "index"}, shared=symbols.shared)
+
+
+def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
+    """Return the step of all estimates, which is repeated until none moves."""
+    symbols = _Symbols.of(parameters, source)
+    own = {name: ca.SX.sym(name) for name in _STATE}
+    xs = ca.SX.sym("xs", source.roots)
+    ys = ca.SX.sym("ys", source.roots)
+    z = complex_of(own["z_x"], own["z_y"])
+    newton = complex_of(own["newton_x"], own["newton_y"])
+    before = _Estimate(z, newton, own["is_short"] != 0.0, ca.SX(0.0))
+
+    all_roots = zip(ca.vertsplit(xs), ca.vertsplit(ys), strict=True)
+    step = before.step_of_all(_repulsion([z - complex_of(x, y) for x, y in all_roots]))
+    moved = symbols.estimate(z - step)
+
+    square = _square(step)
+    height = _square(moved.z) - 1.0
+    # |z|^2 - 1 is about twice the distance to the circle.
+    is_far = square < (_SURELY_COMPLEX / 2) ** 2 * height * height
+    has_converged = ca.logic_or(is_far, square < CONVERGED**2 * _square(moved.z))
+    stays = ca.logic_or(moved.is_root, has_converged)
+    inputs = {**symbols.inputs, **own, "xs": xs, "ys": ys}
+    outputs = {**moved.outputs(source), "goes_on": ca.if_else(stays, 0.0, 1.0)}
+    return PipelineStep(
+        Graph.of("better_estimates", inputs, outputs),
+        source.roots,
+        each={name: source.own(name) for name in _STATE},
+        shared={**symbols.shared, "xs": source.x, "ys": source.y},
+        most=MOST_STEPS,
+    )
+
+
+@dataclass(frozen=True)
+class _Symbols:
+    """The polynomial in symbols, as inputs of a step."""
+
+    inputs: dict[str, _SX]
+    shared: dict[str, str]
+    polynomial: list[Extension]
+    total: _SX
+
+    @classmethod
+    def of(cls, parameters: _SX, source: PolynomialSource) -> _Symbols:
+        """Return new symbols."""
+        every_number, numbers = source.symbol("numbers", source.coefficients)
+        every_total, total = source.symbol("total", 1)
+        return cls(
+            {"parameters": parameters, "numbers": every_number, "total": every_total},
+            {"numbers": source.numbers, "total": source.total},
+            polynomial_of(numbers, source.degree),
+            total,
+        )
+
+    def estimate(self, z: Extension) -> _Estimate:
+        """Return an estimate of a root."""
+        return _Estimate.at(z, self.polynomial, self.total)
+
+
+def _repulsion(apart: list[Extension]) -> Extension:
+    """Return the sum of 1 / z over complex numbers z."""
+    sums = [complex_of(ca.SX(0.0), ca.SX(0.0))] * _SUMS
+    for k, (z, over) in enumerate(zip(apart, _reciprocals(list(map(_square, apart))), strict=True)):
+        # 1 / z = (x - i y) / |z|^2.
+        sums[k % _SUMS] = sums[k % _SUMS] + complex_of(z.x * over, -z.y * over)
+    return sum(sums[1:], sums[0])
+
+
+def _reciprocals(numbers: list[_SX]) -> list[_SX]:
+    """Return 1 / x of positive numbers, with one division for each eight: a division takes as long as some 16 products.
+
+    1 / x is the product of the seven others, over that of all.
+    """
+    reciprocals: list[_SX] = []
+    for begin in range(0, len(numbers), _TOGETHER):
+        part = numbers[begin : begin + _TOGETHER]
+        others, product = _products_of_others(part)
+        reciprocals += [other / product for other in others]
+    return reciprocals
+
+
+def _products_of_others(numbers: list[_SX]) -> tuple[list[_SX], _SX]:
+    """Return the product of all other numbers for each one, and that of all."""
+    if len(numbers) == 1:
+        return [ca.SX(1.0)], numbers[0]
+    half = len(numbers) // 2
+    lower, lower_product = _products_of_others(numbers[:half])
+    upper, upper_product = _products_of_others(numbers[half:])
+    others = [x * upper_product for x in lower] + [x * lower_product for x in upper]
+    return others, lower_product * upper_product
+
+
+def _square(z: Extension) -> _SX:
+    """Return |z|^2."""
+    return z.x * z.x + z.y * z.y
+
+
+def _finite(z: Extension) -> Extension:
+    """Return a number, or 0 where it is none or infinite."""
+    is_finite = _square(z) < _INFINITE
+    return complex_of(ca.if_else(is_finite, z.x, 0.0), ca.if_else(is_finite, z.y, 0.0))
+
+
+def _power(x: _SX, exponent: int) -> _SX:
+    """Return x to a positive whole power, by repeated squares."""
+    if exponent == 1:
+        return x
+    half = _power(x, exponent // 2)
+    return half * half * x if exponent % 2 else half * half
