@@ -20,9 +20,9 @@ from dhkit.kinematics.eliminated import (
     elimination_kernels,
     solve_by_elimination,
 )
-from dhkit.kinematics.eliminated_call import EliminatedPoseCall
+from dhkit.kinematics.eliminated_call import EliminatedPoseCall, are_different
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import SAME_ANGLE, solve
+from dhkit.kinematics.polynomial.solve import SAME_ANGLE, are_distinct, solve
 from dhkit.kinematics.polynomial.two_parallel_pose import pose_program
 from dhkit.symbolic import operation_count
 from ssik_peer import solutions_of
@@ -656,3 +656,18 @@ def test_singular_solutions_have_their_flag_at_any_root():
     is_singular = np.linalg.svd(J, compute_uv=False)[:, -1] < 1e-5
     assert is_singular.sum() == 4 and str(found.status) == "singular"
     assert np.array_equal(found.flags & IKFlag.singular > 0, is_singular)
+
+
+def test_equal_solutions_of_a_call_are_those_of_a_batch():
+    """The same angles count as equal, through pi too, whichever function compares them."""
+    rng = np.random.default_rng(4)
+    for _ in range(2_000):
+        count = int(rng.integers(2, 17))
+        q = rng.uniform(-np.pi, np.pi, (count, 6))
+        if rng.random() < 0.3:
+            q[:, 0] = np.pi + 1e-6 * rng.normal(size=count)
+        first, second = rng.choice(count, 2, replace=False)
+        q[first] = q[second] + rng.uniform(-1.0, 1.0, 6) * rng.choice([1e-7, 3e-6, 1e-4])
+        q = np.angle(np.exp(1j * q))
+        is_one = are_distinct(q, np.zeros(count, dtype=np.intp))
+        assert are_different(q) == is_one.all()

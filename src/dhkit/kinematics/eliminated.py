@@ -25,7 +25,7 @@ from dhkit.kinematics.closed_form.formulas import SINGULAR
 from dhkit.kinematics.jacobian import jacobian, jacobian_kernel
 from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
-from dhkit.kinematics.polynomial.pose_results import PoseProgram, PoseResults, output_sizes
+from dhkit.kinematics.polynomial.pose_results import OUTPUT_SIZES, PoseProgram, PoseResults
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import (
     SAME_ANGLE,
@@ -136,7 +136,7 @@ class _SurePoses:
         for begin in range(0, len(poses), _TOGETHER):
             some = slice(begin, begin + _TOGETHER)
             goals = poses[some]
-            others = [np.empty((len(goals), size)) for size in output_sizes(arm.details)[1:]]
+            others = [np.empty((len(goals), size)) for size in OUTPUT_SIZES[1:]]
             arm.pose_kernel(parameters, [goals], [q[some].reshape(len(goals), -1), *others])
             flags[some], counts[some] = _flags_and_counts(others, q[some])
             is_unsure = counts[some] == 0
@@ -145,7 +145,7 @@ class _SurePoses:
             errors.append(error[is_unsure])
         unsure = PoseResults.read(
             q[counts == 0],
-            np.concatenate([np.empty((0, arm.details * ROOTS)), *details]),
+            np.concatenate([np.empty((0, OUTPUT_SIZES[2])), *details]),
             np.concatenate([np.empty((0, 1)), *errors]),
         )
         return cls(q, flags, counts, unsure)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -14,9 +15,9 @@ from dhkit.kernels import FastCall, SingleCall, never
 from dhkit.kernels.background import Background
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.eliminated import branch_names, elimination_kernels, has_curves
-from dhkit.kinematics.polynomial.pose_results import PoseProgram
+from dhkit.kinematics.polynomial.pose_results import OUTPUT_SIZES, PoseProgram
 from dhkit.kinematics.polynomial.six_joints import six_joints
-from dhkit.kinematics.polynomial.solve import are_distinct
+from dhkit.kinematics.polynomial.solve import SAME_SOLUTION
 from dhkit.kinematics.polynomial.trigonometric import ROOTS
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
@@ -26,6 +27,7 @@ _NO_DISTANCE = bytes(8)
 _STATUS = bytes([IKStatus.ok])
 _FEW = 16
 """Largest number of poses that are solved one after the other."""
+_BESIDE = 2 * SAME_SOLUTION
 _INSIDE = 0
 _OUTSIDE = int(IKFlag.out_of_limits)
 
@@ -41,7 +43,7 @@ class EliminatedPoseCall:
         middle = np.arange(1.0, description.n + 1.0) / description.n
         self._description = description
         # Which solutions are outside their limits, and the number of solutions; the roots' details are left out.
-        self._packed = struct.Struct(f"{ROOTS}d{8 * arm.details * ROOTS}xd8x")
+        self._packed = struct.Struct(f"{ROOTS}d{8 * OUTPUT_SIZES[2]}xd8x")
         self._shared: dict[int, dict[str, object]] = {}
         self._call: FastCall = SingleCall(
             arm.pose_kernel,
@@ -115,7 +117,7 @@ class EliminatedPoseCall:
         if not verdict > 0.0:
             return None
         count = int(verdict)
-        if verdict != count and not _are_different(q[:count]):
+        if verdict != count and not are_different(q[:count]):
             return None
         flags = bytes(count)
         if 1.0 in are_outside:
@@ -139,9 +141,20 @@ def _summary(count: int, flags: bytes, branches: int) -> bytes:
     return b"%b%b%b%b%b%b" % (_NO_DISTANCE, b"\1" * count, rest, flags, rest, _STATUS)
 
 
-def _are_different(q: Array) -> bool:
-    """Return whether no two solutions (K, 6) of a pose are the same."""
-    return bool(are_distinct(q, np.zeros(len(q), dtype=np.intp)).all())
+def are_different(q: Array) -> bool:
+    """Return whether no two solutions (K, 6) of a pose, rad, are the same."""
+    rows = sorted(q.tolist())
+    # Those at -pi once more after those at pi.
+    beyond = [[row[0] + math.tau, *row[1:]] for row in rows if row[0] < _BESIDE - math.pi]
+    around = rows + beyond
+    for k, row in enumerate(rows):
+        for other in around[k + 1 :]:
+            if other[0] - row[0] > SAME_SOLUTION:
+                break
+            pairs = zip(row, other, strict=True)
+            if all(abs(math.remainder(a - b, math.tau)) <= SAME_SOLUTION for a, b in pairs):
+                return False
+    return True
 
 
 class EliminationCall:

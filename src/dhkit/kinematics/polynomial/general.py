@@ -30,9 +30,8 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import tool_kernel
 from dhkit.kinematics.newton import Newton, error_kernel, magnitude
 from dhkit.kinematics.polynomial.pose_results import (
-    COMMON_DETAILS,
+    OUTPUT_SIZES,
     PoseResults,
-    output_sizes,
 )
 from dhkit.kinematics.polynomial.solve import Candidates
 from dhkit.kinematics.polynomial.trigonometric import angles, real_roots, roots_kernel
@@ -96,11 +95,6 @@ class CompiledGeneral:
         return np.concatenate([[1.0 / arm.newton.length], *map(np.ravel, numbers)])
 
     @property
-    def details(self) -> int:
-        """Number of details of a root."""
-        return COMMON_DETAILS
-
-    @property
     def pose_kernel(self) -> Kernel:
         """The kernel of :func:`dhkit.kinematics.polynomial.general_pose.pose_program`."""
         arm = self.lapack
@@ -110,7 +104,7 @@ class CompiledGeneral:
 
             return pose_program(arm.joint, arm.is_reversed)
 
-        types = ("float64",) * len(output_sizes(self.details))
+        types = ("float64",) * len(OUTPUT_SIZES)
         return kernel("general_pose", f"{arm.joint} {arm.is_reversed}", derived, types)
 
     @property

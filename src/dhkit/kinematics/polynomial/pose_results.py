@@ -11,10 +11,18 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 from dhkit.kernels import Kernel
 from dhkit.kinematics.polynomial.solve import Candidates
-from dhkit.kinematics.polynomial.trigonometric import ROOTS, expected_roots
+from dhkit.kinematics.polynomial.trigonometric import (
+    IS_BESIDE,
+    IS_DELICATE,
+    IS_REAL,
+    IS_TRIED,
+    ROOTS,
+    expected_roots,
+)
 
-COMMON_DETAILS = 5
-"""Number of details of a root that all programs give."""
+_DETAILS = 4
+OUTPUT_SIZES = (6 * ROOTS, ROOTS, _DETAILS * ROOTS, 1, 1)
+"""Numbers of entries of a program's outputs, which are :data:`dhkit.kinematics.polynomial.pose_steps.RESULTS`."""
 
 
 class PoseProgram(Protocol):
@@ -22,23 +30,14 @@ class PoseProgram(Protocol):
 
     @property
     def pose_kernel(self) -> Kernel:
-        """The program, whose outputs have the sizes of :func:`output_sizes`."""
+        """The program, whose outputs have the sizes of :data:`OUTPUT_SIZES`."""
 
     @property
     def parameters(self) -> Array:
         """Its parameters but for the limits, which follow."""
 
-    @property
-    def details(self) -> int:
-        """Number of details of a root."""
-
     def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:
         """Return joint values at the roots that the program found at poses, shape (N, 16), m."""
-
-
-def output_sizes(details: int) -> tuple[int, ...]:
-    """Return the numbers of entries of a program's outputs, with a number of details of a root."""
-    return (6 * ROOTS, ROOTS, details * ROOTS, 1, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,7 @@ class PoseResults:
     angle: Array
     """The root itself, shape (N, 16), rad."""
     more: Array
-    """Further details, shape (N, 16, K)."""
+    """The last detail, shape (N, 16)."""
     error_of_polynomial: Array
     """Shape (N, 1)."""
 
@@ -65,7 +64,7 @@ class PoseResults:
     def of(cls, program: PoseProgram, poses: Array) -> PoseResults:
         """Return the results of poses, shape (N, 16), m; limits do not matter."""
         parameters = np.concatenate([program.parameters, np.full(6, -np.inf), np.full(6, np.inf)])
-        outputs = [np.empty((len(poses), size)) for size in output_sizes(program.details)]
+        outputs = [np.empty((len(poses), size)) for size in OUTPUT_SIZES]
         program.pose_kernel(parameters, [poses], outputs)
         q, _, of_roots, _, error_of_polynomial = outputs
         return cls.read(q, of_roots, error_of_polynomial)
@@ -80,16 +79,19 @@ class PoseResults:
             Its outputs for N poses, shape (N, ...) each: joint values, rad, details of the roots, and the polynomial's
             error.
         """
-        details = of_roots.reshape(len(q), ROOTS, of_roots.shape[1] // ROOTS)
+        details = of_roots.reshape(len(q), ROOTS, _DETAILS)
+        states, error, angle, more = np.moveaxis(details, -1, 0)
+        # NaN, of matrices that are not finite, is 0.
+        bits = np.where(states > 0.0, states, 0.0).astype(np.uint8)
         return cls(
             q.reshape(len(q), ROOTS, 6),
-            details[:, :, 0] > 0.0,
-            details[:, :, 1] > 0.0,
-            details[:, :, 2] > 0.0,
-            details[:, :, 2] > 1.0,
-            details[:, :, 3],
-            details[:, :, 4],
-            details[:, :, COMMON_DETAILS:],
+            bits & IS_TRIED > 0,
+            bits & IS_REAL > 0,
+            bits & (IS_BESIDE | IS_DELICATE) > 0,
+            bits & IS_DELICATE > 0,
+            error,
+            angle,
+            more,
             error_of_polynomial.reshape(len(q), 1),
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from typing import Any, TypeAlias
 
@@ -28,6 +28,10 @@ from dhkit.kinematics.polynomial.solve import CLOSES, INEXACT, SAME_ANGLE, SORTE
 from dhkit.kinematics.polynomial.trigonometric import (
     DEGREE,
     DOUBTFUL,
+    IS_BESIDE,
+    IS_DELICATE,
+    IS_REAL,
+    IS_TRIED,
     NEAR_SOLUTION,
     NONE,
     ROOTS,
@@ -44,17 +48,13 @@ RESULTS = ("sorted_q", "sorted_is_outside", "sorted_details", "verdict", "error"
 
 - joint values, 16 times 6, rad;
 - whether a joint is outside its limits, 16 times;
-- details of the root, 16 times 5 or more: whether it is nearly real, and real; 1 if another root is near, and 2 if its
-  solution may be singular or that of another root; the error of its joint values; its angle, rad; and more by the way
-  of elimination;
-- ``verdict``, the number of solutions if all are known, plus 0.5 if some lie so near that they may be the same one; 0
-  if they are not known, or T is no pose;
+- details of the root, 16 times 4: what is known of it, as the sum of ``IS_TRIED``, ``IS_REAL``, ``IS_BESIDE`` and
+  ``IS_DELICATE``; the error of its joint values; its angle, rad; and a number that the way of elimination reads, 0
+  where the root has just one solution;
+- ``verdict``, the number of solutions if all are known, plus a fraction if some lie so near that they may be the same
+  one; 0 if they are not known, or T is no pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
-BESIDE = 1.0
-"""Another root is nearer than NEAR_ROOTS or at the same angle: their solutions may be the same one, or singular."""
-_DELICATE = 2.0
-"""The solution may be singular, or that of another root."""
 _ON_CIRCLE = 1e-6
 """Imaginary part of a root, rad, above which it is not surely real."""
 _AT_ROOT = 1e-5
@@ -70,7 +70,7 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
 
     Their outputs are ``error``, and of each root ``sorted_angle``, rad, ``sorted_is_tried``, ``sorted_is_real``,
-    ``sorted_closeness``, ``BESIDE`` where another root is near, else 0, and ``sorted_is_idle``, 1 of a root that is
+    ``sorted_closeness``, 1 where another root is nearer than ``NEAR_ROOTS`` or at the same angle, else 0, and ``sorted_is_idle``, 1 of a root that is
     surely complex, else 0. The roots that are surely complex are the last.
 
     Parameters
@@ -145,7 +145,7 @@ def _angles(parameters: _SX) -> PipelineStep:
     is_tried = angle < BEYOND
     # The root 1 / conj(z) is at the same angle: both lead to one solution.
     is_double = ca.logic_and(is_tried, height > _ON_CIRCLE)
-    closeness = ca.if_else(ca.logic_or(nearest < NEAR_ROOTS**2, is_double), BESIDE, 0.0)
+    closeness = ca.if_else(ca.logic_or(nearest < NEAR_ROOTS**2, is_double), 1.0, 0.0)
     inputs = {
         "parameters": parameters,
         "numbers": numbers,
@@ -175,19 +175,16 @@ def _verdict(parameters: _SX) -> PipelineStep:
     kinds = ca.SX.sym("kinds", ROOTS)
     posed = ca.SX.sym("posed")
     error = ca.SX.sym("error")
-    every = ca.vertsplit(kinds)
-
-    def number_of(are_so: Iterable[_SX]) -> _SX:
-        return sum((ca.if_else(is_so, 1.0, 0.0) for is_so in are_so), ca.SX(0.0))
-
-    count = number_of(kind != NONE for kind in every)
+    terms = ca.vertsplit(kinds)
+    while len(terms) > 1:
+        terms = [sum(terms[k + 1 : k + 2], terms[k]) for k in range(0, len(terms), 2)]
+    (total,) = terms
     # Complex roots come in pairs: an odd number is not all.
-    is_even = count == 2.0 * ca.floor(count / 2.0)
+    pairs = ca.floor(total / 2.0)
+    is_even = total - 2.0 * pairs < 1.0
     is_known = ca.logic_and(posed == 1.0, error < INEXACT)
-    are_single = number_of(kind == DOUBTFUL for kind in every) == 0.0
-    is_sure = ca.logic_and(ca.logic_and(is_known, are_single), is_even)
-    are_near = number_of(kind == NEAR_SOLUTION for kind in every) > 0.0
-    verdict = ca.if_else(is_sure, count + ca.if_else(are_near, 0.5, 0.0), 0.0)
+    is_sure = ca.logic_and(ca.logic_and(is_known, total < DOUBTFUL), is_even)
+    verdict = ca.if_else(is_sure, total, 0.0)
     inputs = {"parameters": parameters, "kinds": kinds, "posed": posed, "error": error}
     return PipelineStep(
         Graph.of("verdict", inputs, {"verdict": verdict}),
@@ -251,7 +248,7 @@ def known_solutions(
     closeness: _SX,
     is_delicate: _SX,
     place: int,
-    more: Sequence[_SX] = (),
+    more: _SX = 0.0,
 ) -> Graph:
     """Return the program of the last step: joint values at roots, and what is known of them.
 
@@ -270,14 +267,13 @@ def known_solutions(
     place
         Index of the joint that the polynomial is in.
     more
-        Further details, of which none is above 0 at a root that has just one solution.
+        The last detail, above 0 at a root that has further solutions.
     """
     is_tried, is_real = of_root
     # Iteration from joint values that are not those of the root may lead to the solution of another root.
     away = ca.fabs(ca.sin((q[place] - inputs["angle"]) / 2.0))
     is_delicate = ca.logic_or(is_delicate, ca.logic_not(away < _AT_ROOT))
-    has_more = sum((ca.if_else(x > 0.0, 1.0, 0.0) for x in more), ca.SX(0.0)) > 0.0
-    is_alone = ca.logic_not(ca.logic_or(is_delicate, has_more))
+    is_alone = ca.logic_not(ca.logic_or(is_delicate, more > 0.0))
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
     of_complex = ca.if_else(is_real != 0.0, DOUBTFUL, NONE)
     one = ca.if_else(closeness > 0.0, NEAR_SOLUTION, SOLUTION)
@@ -299,10 +295,14 @@ def known_solutions(
         """Return 0 where the root is complex: what follows from it is without meaning."""
         return ca.if_else(is_tried != 0.0, x, 0.0)
 
-    is_near = ca.if_else(closeness > 0.0, BESIDE, 0.0)
-    care = ca.if_else(is_delicate, _DELICATE, is_near)
-    of_tried = map(at_tried, (error, inputs["angle"], *more))
-    details = [is_tried, is_real, care, *of_tried]
+    known = [
+        (is_tried != 0.0, IS_TRIED),
+        (is_real != 0.0, IS_REAL),
+        (closeness > 0.0, IS_BESIDE),
+        (is_delicate, IS_DELICATE),
+    ]
+    state = sum(ca.if_else(is_so, float(bit), 0.0) for is_so, bit in known)
+    details = [state, *map(at_tried, (error, inputs["angle"], more))]
     outputs = {
         "q": ca.vertcat(*map(at_tried, ca.vertsplit(q))),
         "is_outside": at_tried(is_outside),

@@ -55,8 +55,7 @@ def roots_program(degree: int, samples: int) -> Loop:
 
     - ``angle``, rad, in [-pi, pi]; ``BEYOND`` for a root whose height is beyond ``_NEARLY_REAL``, or which is not real
       even if the error of f is ``_MARGIN`` times the assumed one;
-    - ``is_real``, whether the height is 0 up to the root's error, |height f'| < error of f, or cannot be told from 0,
-      because f at the real angle is hardly larger than the coefficients' error;
+    - ``is_real``, whether f at the real angle is 0 up to its error, or hardly larger than the coefficients' error;
     - ``is_delicate``, one number: whether two roots nearly coincide, so that a solution may be singular;
     - ``error``, one number: the largest coefficient beyond the degree, relative to the others; infinite for values that
       are all 0.
@@ -226,13 +225,13 @@ def nearly_real(polynomial: list[Extension], root: Extension, error: SX) -> tupl
     square = root.x * root.x + root.y * root.y
     # ln(square) / 2 of a square near 1, up to its cube.
     height = ca.fabs((square - 1.0) / (square + 1.0))
-    # f = p / z^degree and |z| is about 1: |f'| = |p'| at a root, and f is height f' at the real angle beside it.
-    _, slope = value_and_slope(polynomial, root)
-    value = height * ca.sqrt(slope.x * slope.x + slope.y * slope.y)
+    # Between the two roots of a pair f = f'' (x^2 + height^2) / 2: that is height f' / 2, as f' is at the roots.
+    least = ca.fabs(_at_real_angle(polynomial, root))
+    value = 2.0 * least
     is_tried = ca.logic_and(height < _NEARLY_REAL, value < _MARGIN * tolerance)
     angle = ca.if_else(is_tried, ca.atan2(root.y, root.x), BEYOND)
     # Where |f| is that small over a whole interval, the roots in it may be anywhere.
-    is_unknown = ca.fabs(_at_real_angle(polynomial, root)) < _UNKNOWN * ca.fmax(error, ROUNDING)
+    is_unknown = least < _UNKNOWN * ca.fmax(error, ROUNDING)
     return angle, height, ca.if_else(ca.logic_or(value < tolerance, is_unknown), 1.0, 0.0)
 
 

@@ -28,7 +28,7 @@ SAME_ANGLE = 1e-6
 """Angles that differ by less, rad, count as equal when solutions are sorted."""
 SORTED_BY = 5
 """Number of joints by which solutions are sorted."""
-_SAME_SOLUTION = 1e-5
+SAME_SOLUTION = 1e-5
 """Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
 _NUMBERED = 3
 """Number of joints that make the number by which solutions are sorted."""
@@ -267,12 +267,12 @@ def are_distinct(q: Array, owner: NDArray[np.intp]) -> NDArray[np.bool_]:
     number = number[order]
     is_new = np.ones(len(q), dtype=bool)
     for lag in range(1, len(q)):
-        near = np.flatnonzero(number[lag:] - number[:-lag] < _NUMBERED * _SAME_SOLUTION)
+        near = np.flatnonzero(number[lag:] - number[:-lag] < _NUMBERED * SAME_SOLUTION)
         if not len(near):
             break
         # |e^(ia) - e^(ib)| = 2 |sin((a - b) / 2)|, about |a - b|.
         apart = 2 * np.abs(np.sin((in_order[near + lag] - in_order[near]) / 2)).max(axis=1)
-        is_new[order[near[apart <= _SAME_SOLUTION] + lag]] = False
+        is_new[order[near[apart <= SAME_SOLUTION] + lag]] = False
     return is_new
 
 

@@ -29,9 +29,8 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.chain import Chain
 from dhkit.kinematics.polynomial.extension import SIGNS
 from dhkit.kinematics.polynomial.pose_results import (
-    COMMON_DETAILS,
+    OUTPUT_SIZES,
     PoseResults,
-    output_sizes,
     with_more,
 )
 from dhkit.kinematics.polynomial.solve import Candidates
@@ -93,11 +92,6 @@ class TwoParallel:
         )
 
     @property
-    def details(self) -> int:
-        """Number of details of a root: which combinations of signs fit, besides those of all programs."""
-        return COMMON_DETAILS + len(SIGNS)
-
-    @property
     def kernels(self) -> Sequence[Kernel]:
         """The kernels of the programs."""
         return [self.pose_kernel, self._joints_kernel]
@@ -111,7 +105,7 @@ class TwoParallel:
 
             return pose_program(self.meeting)
 
-        types = ("float64",) * len(output_sizes(self.details))
+        types = ("float64",) * len(OUTPUT_SIZES)
         return kernel("two_parallel_pose", f"{self.meeting}", derived, types, is_loop=True)
 
     @property
@@ -130,11 +124,11 @@ class TwoParallel:
     def candidates_of(self, results: PoseResults, poses: Array) -> Candidates:
         """Return joint values at the roots that the program found at poses, shape (N, 16), m."""
         found = results.candidates()
-        also = results.more[results.is_near]
-        if not (also > 0.0).any():
+        also = results.more[results.is_near].astype(np.uint8)
+        if not also.any():
             return found
         # Roots that serve several combinations of signs have several solutions.
-        root, choice = np.nonzero(also > 0.0)
+        root, choice = np.nonzero(also[:, None] >> np.arange(len(SIGNS)) & 1)
         more, errors = self._with_signs(
             poses[found.owner[root]], found.q[root, :1], np.array(SIGNS)[choice]
         )

@@ -40,7 +40,7 @@ def pose_program(meeting: tuple[int, int]) -> Pipeline:
     """Return the program: the tool's pose to solutions, as :data:`dhkit.kinematics.polynomial.pose_steps.RESULTS`.
 
     Parameters are those of :class:`dhkit.kinematics.polynomial.two_parallel.TwoParallel`, then lower and upper limits.
-    The last four details of a root tell which other combinations of signs fit, see
+    The last detail of a root tells which other combinations of signs fit, as bits of a number, see
     :func:`dhkit.kinematics.polynomial.two_parallel_program.fitting_signs`.
     """
     parameters = ca.SX.sym("parameters", COUNT + _LIMITS)
@@ -99,6 +99,7 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> Graph:
     of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "closeness")]
     is_tried, is_real, closeness = of_root
     signs, also = fitting_signs(Numbers.read(parameters[:COUNT]), meeting, goal, angle)
+    others = sum(fits * float(2**k) for k, fits in enumerate(ca.vertsplit(also)))
     q, error, is_regular = solution_function(meeting)(parameters[:COUNT], goal, angle, signs)
     is_delicate = ca.logic_not(is_regular)
     inputs = {
@@ -116,5 +117,5 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> Graph:
         closeness,
         is_delicate,
         0,
-        ca.vertsplit(also),
+        others,
     )
