@@ -32,6 +32,7 @@ from dhkit.kinematics.newton import Newton, error_kernel, magnitude
 from dhkit.kinematics.polynomial.pose_results import (
     OUTPUT_SIZES,
     PoseResults,
+    with_more,
 )
 from dhkit.kinematics.polynomial.solve import Candidates
 from dhkit.kinematics.polynomial.trigonometric import angles, real_roots, roots_kernel
@@ -60,6 +61,8 @@ _MIXED = 0.7 + 0.3j
 """Factor t of t x + y, by which two solutions differ even if they share x or y."""
 _OF_TWO_POWERS: Complex = np.kron(_AS_POWERS, _AS_POWERS)
 _EACH = slice(None)
+_NEAR = 1e-6
+"""Error of joint values, share of the reach and rad, above which a root is solved once more."""
 _FIRST_ANGLE = 0.1
 """First angle at which polynomials are evaluated, rad."""
 _WORK = 4
@@ -195,21 +198,19 @@ class General:
         )
 
     def candidates_at(self, results: PoseResults, poses: Array) -> Candidates:
-        """Return joint values at the roots that the elimination's program found at poses, shape (N, 16), m."""
-        roots = results.candidates()
-        angles = results.angle[results.is_near]
+        """Return joint values at the roots that the elimination's program found at poses, shape (N, 16), m.
+
+        Those of the program are kept, but where they may be singular or do not close.
+        """
+        found = results.candidates()
+        is_clean = (~results.is_delicate & (results.error < _NEAR))[results.is_near]
+        asked = np.flatnonzero(~is_clean)
+        owner = found.owner[asked]
         motions = self._motions(poses)
-        side = self._reduced(motions)
-        of_root, q = self._joints_at_roots(motions, side, roots.owner, angles)
-        owner = roots.owner[of_root]
-        return replace(
-            roots,
-            q=q,
-            error=magnitude(self.newton.error(q, poses[owner])),
-            may_be_singular=np.ones(len(q), dtype=bool),
-            owner=owner,
-            root=of_root,
-        )
+        angles = results.angle[results.is_near][asked]
+        of_root, q = self._joints_at_roots(motions, self._reduced(motions), owner, angles)
+        error = magnitude(self.newton.error(q, poses[owner[of_root]]))
+        return with_more(found, q, error, asked[of_root], is_clean)
 
     def _joints_at_roots(
         self, motions: Array, side: _FarSide, owner: NDArray[np.intp], roots: Array
@@ -324,29 +325,42 @@ class General:
 
     def _far_side(self, motions: Array) -> Array:
         """Return the equations' other side in products of the two far joints, shape (N, 14, 9)."""
+        points, directions, turns, shifts = self._far_lines
+        R = motions[:, None, :3, :3]
+        position = motions[:, None, :3, 3]
+        moved = turns @ (R @ points[:, :, None] + position[..., None])
+        point = moved[..., 0] + shifts - self.points[self.joint - 1]
+        direction = (turns @ (R @ directions[:, :, None]))[..., 0]
+        side: Array = np.einsum("kl,nlj->njk", _OF_TWO_ANGLES, _equations(point, direction))
+        return side
+
+    @cached_property
+    def _far_lines(self) -> tuple[Array, Array, Array, Array]:
+        """Axis i + 3 behind and motions before the tool's, at nine pairs of the far joints' angles.
+
+        They are points and directions, shape (9, 3) each, which joints from axis 5 on have moved, then the rotations
+        (9, 3, 3) and shifts (9, 3) by joints 1 and 2.
+        """
         i = self.joint - 1
         a, b = self._far_places
-        count = len(motions)
-        R = motions[:, :3, :3]
-        position = motions[:, :3, 3]
-        values = []
+        lines = []
+        motions = []
         for first in _ANGLES:
             for second in _ANGLES:
                 line = (self.points[i + 3], self.directions[i + 3])
-                # From the line outwards: joints behind it, from axis 5 on, then M, then joints 1 and 2.
+                shift = np.zeros(3)
+                turned = np.eye(3)
                 for place, angle in ((a, first), (b, second)):
                     if place > i + 3:
                         line = self._moved(place, -angle, *line)
-                point = np.broadcast_to(line[0], (count, 3))
-                direction = np.broadcast_to(line[1], (count, 3))
-                point = np.einsum("nij,nj->ni", R, point) + position
-                direction = np.einsum("nij,nj->ni", R, direction)
-                for place, angle in ((a, first), (b, second)):
-                    if place < i:
-                        point, direction = self._moved(place, -angle, point, direction)
-                values.append(_equations(point - self.points[i], direction))
-        side: Array = np.einsum("kl,lnj->njk", _OF_TWO_ANGLES, np.array(values))
-        return side
+                    elif place < i:
+                        shift, turned = self._moved(place, -angle, shift, turned)
+                lines.append(line)
+                # Rows are where unit vectors are moved.
+                motions.append((turned.T, shift))
+        points, directions = map(np.array, zip(*lines, strict=True))
+        turns, shifts = map(np.array, zip(*motions, strict=True))
+        return points, directions, turns, shifts
 
     def _moved(
         self, place: int, angle: float, point: Array, direction: Array

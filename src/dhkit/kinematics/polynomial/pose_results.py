@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -115,18 +115,33 @@ class PoseResults:
         )
 
 
-def with_more(found: Candidates, q: Array, error: Array, root: NDArray[np.intp]) -> Candidates:
-    """Return candidates with others (K, 6), rad, at roots (K,) that have several solutions."""
-    roots = np.concatenate([found.root, root])
+def with_more(
+    found: Candidates,
+    q: Array,
+    error: Array,
+    root: NDArray[np.intp],
+    is_kept: NDArray[np.bool_] | None = None,
+) -> Candidates:
+    """Return candidates with others.
+
+    Parameters
+    ----------
+    found
+        One candidate for each root, shape (L,).
+    q, error, root
+        The others: joint values, shape (K, 6), rad, their errors, and indices of their roots, shape (K,) each.
+    is_kept
+        Which candidates are kept, shape (L,); all unless given.
+    """
+    kept = found.root if is_kept is None else found.root[is_kept]
+    roots = np.concatenate([kept, root])
     order = np.argsort(roots, kind="stable")
-    return Candidates(
-        np.concatenate([found.q, q])[order],
-        np.concatenate([found.error, error])[order],
-        np.concatenate([found.may_be_singular, np.ones(len(q), dtype=bool)])[order],
-        found.owner[roots[order]],
-        roots[order],
-        found.expected,
-        found.may_repeat,
-        found.is_delicate,
-        found.error_of_polynomial,
+    may_be_singular = np.ones(len(q), dtype=bool)
+    return replace(
+        found,
+        q=np.concatenate([found.q[kept], q])[order],
+        error=np.concatenate([found.error[kept], error])[order],
+        may_be_singular=np.concatenate([found.may_be_singular[kept], may_be_singular])[order],
+        owner=found.owner[roots[order]],
+        root=roots[order],
     )

@@ -70,8 +70,8 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
     """Return the steps from ``value``, of equally spaced angles from ``first`` on, to what is known of the roots.
 
     Their outputs are ``error``, and of each root ``sorted_angle``, rad, ``sorted_is_tried``, ``sorted_is_real``,
-    ``sorted_closeness``, 1 where another root is nearer than ``NEAR_ROOTS`` or at the same angle, else 0, and ``sorted_is_idle``, 1 of a root that is
-    surely complex, else 0. The roots that are surely complex are the last.
+    ``sorted_closeness``, 1 where another root is nearer than ``NEAR_ROOTS`` or at the same angle, else 0, and
+    ``sorted_is_idle``, 1 of a root that is surely complex, else 0. The roots that are surely complex are the last.
 
     Parameters
     ----------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -135,14 +134,11 @@ class SixJoints:
 
         To both sides, for of two solutions that nearly coincide there is perhaps none at one side.
         """
-        q = []
-        owner = []
-        for displaced in _displaced(poses, Axes.of(self.description).scale):
-            beside = solve(self.description, self.elimination.candidates, displaced)
-            ends, closed = refined(self.description, beside.q, poses[beside.owner])
-            q.append(ends[closed])
-            owner.append(beside.owner[closed])
-        return np.concatenate(q), np.concatenate(owner)
+        displaced = _displaced(poses, Axes.of(self.description).scale)
+        beside = solve(self.description, self.elimination.candidates, displaced.reshape(-1, 16))
+        owner = beside.owner % len(poses)
+        ends, closed = refined(self.description, beside.q, poses[owner])
+        return ends[closed], owner[closed]
 
     def _iterated(
         self, poses: Array, known: Found, rows: NDArray[np.intp]
@@ -186,19 +182,20 @@ class SixJoints:
         return q, owner
 
 
-def _displaced(poses: Array, length: float) -> Iterator[Array]:
-    """Yield poses (N, 16) that are moved and turned a little, by random amounts, each to both sides."""
+def _displaced(poses: Array, length: float) -> Array:
+    """Return poses (N, 16) moved and turned a little, by random amounts, each to both sides, shape (K, N, 16)."""
     rng = np.random.default_rng(0)
+    displaced = []
     for size in _DISPLACEMENTS:
         phi = size * rng.uniform(-1.0, 1.0, 3)
         angle = float(np.linalg.norm(phi))
         shift = size * length * rng.uniform(-1.0, 1.0, 3)
         for sign in (1.0, -1.0):
-            displaced = poses.reshape(-1, 4, 4).copy()
-            R = turned_about(phi / angle, np.array(sign * angle))
-            displaced[:, :3, :3] = R @ displaced[:, :3, :3]
-            displaced[:, :3, 3] += sign * shift
-            yield displaced.reshape(-1, 16)
+            T = poses.reshape(-1, 4, 4).copy()
+            T[:, :3, :3] = turned_about(phi / angle, np.array(sign * angle)) @ T[:, :3, :3]
+            T[:, :3, 3] += sign * shift
+            displaced.append(T.reshape(-1, 16))
+    return np.array(displaced)
 
 
 @lru_cache(maxsize=64)

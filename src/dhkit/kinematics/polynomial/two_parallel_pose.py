@@ -13,6 +13,7 @@ import casadi as ca
 
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import orthonormal_goal
+from dhkit.kinematics.polynomial.extension import SIGNS
 from dhkit.kinematics.polynomial.pose_steps import (
     RESULTS,
     known_solutions,
@@ -99,7 +100,7 @@ def _solutions(parameters: _SX, meeting: tuple[int, int]) -> Graph:
     of_root = [ca.SX.sym(name) for name in ("is_tried", "is_real", "closeness")]
     is_tried, is_real, closeness = of_root
     signs, also = fitting_signs(Numbers.read(parameters[:COUNT]), meeting, goal, angle)
-    others = sum(fits * float(2**k) for k, fits in enumerate(ca.vertsplit(also)))
+    others = ca.dot(ca.DM([2.0**k for k in range(len(SIGNS))]), also)
     q, error, is_regular = solution_function(meeting)(parameters[:COUNT], goal, angle, signs)
     is_delicate = ca.logic_not(is_regular)
     inputs = {
