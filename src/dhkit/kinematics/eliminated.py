@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
-from dhkit.kernels import Kernel, pose_rows
+from dhkit.kernels import Kernel, large_array, pose_rows
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import (
     are_poses,
@@ -37,9 +36,12 @@ from dhkit.kinematics.polynomial.trigonometric import ROOTS
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
-_TOGETHER = 256
-"""Poses whose roots are held together, some 500 KB."""
+_TOGETHER = 512
+"""Poses whose roots are held together, some 700 KB."""
 _SINGULAR = np.uint8(IKFlag.singular)
+_OF_UNSURE = (0, 2, 4)
+"""Outputs of a program that are kept of poses of which it is not sure: joint values, details of the roots, the error of
+the polynomial."""
 _OUT_OF_LIMITS = np.uint8(IKFlag.out_of_limits)
 _MOST_NUMBERS = 4_000_000
 """Largest number of distances that are held at a time, 32 MB."""
@@ -115,9 +117,9 @@ class _SurePoses:
     """Solutions of those of N poses whose roots lie apart and give one solution each, as the program tells."""
 
     q: Array
-    """Sorted solutions, shape (N, 16, 6), rad; where there are fewer, any numbers follow."""
+    """Sorted solutions, shape (N, 16, 6), rad; where there are fewer, NaN follows. Of other poses any numbers."""
     flags: NDArray[np.uint8]
-    """Shape (N, 16), likewise."""
+    """Shape (N, 16), likewise, with 0 instead of NaN."""
     counts: NDArray[np.intp]
     """Number of solutions, shape (N,); 0 of other poses."""
     unsure: PoseResults
@@ -128,27 +130,21 @@ class _SurePoses:
         """Return the solutions of matrices, shape (N, 16)."""
         numbers = description.numbers
         parameters = np.concatenate([arm.parameters, numbers.lower, numbers.upper])
-        q = np.empty((len(poses), ROOTS, description.n))
+        q = large_array((len(poses), ROOTS, description.n))
         flags = np.empty((len(poses), ROOTS), dtype=np.uint8)
         counts = np.empty(len(poses), dtype=np.intp)
-        details = []
-        errors = []
+        unsure = [tuple(np.empty((0, OUTPUT_SIZES[k])) for k in _OF_UNSURE)]
         for begin in range(0, len(poses), _TOGETHER):
             some = slice(begin, begin + _TOGETHER)
-            goals = poses[some]
-            others = [np.empty((len(goals), size)) for size in OUTPUT_SIZES[1:]]
-            arm.pose_kernel(parameters, [goals], [q[some].reshape(len(goals), -1), *others])
-            flags[some], counts[some] = _flags_and_counts(others, q[some])
+            own = q[some]
+            outputs = [own.reshape(len(own), -1)]
+            outputs += [np.empty((len(own), size)) for size in OUTPUT_SIZES[1:]]
+            arm.pose_kernel(parameters, [poses[some]], outputs)
+            flags[some], counts[some] = _flags_and_counts(outputs[1:], own)
             is_unsure = counts[some] == 0
-            _, of_roots, _, error = others
-            details.append(of_roots[is_unsure])
-            errors.append(error[is_unsure])
-        unsure = PoseResults.read(
-            q[counts == 0],
-            np.concatenate([np.empty((0, OUTPUT_SIZES[2])), *details]),
-            np.concatenate([np.empty((0, 1)), *errors]),
-        )
-        return cls(q, flags, counts, unsure)
+            unsure.append(tuple(outputs[k][is_unsure] for k in _OF_UNSURE))
+        all_unsure = map(np.concatenate, zip(*unsure, strict=True))
+        return cls(q, flags, counts, PoseResults.read(*all_unsure))
 
     def solutions(
         self,
@@ -159,13 +155,20 @@ class _SurePoses:
         """Return all solutions, with those of other poses in their rows (M,)."""
         B = max(1, int(self.counts.max(initial=0)), 0 if others is None else len(others.branches))
         valid = np.arange(B) < self.counts[:, None]
-        q = _columns(self.q, valid, np.nan)
-        flags = _columns(self.flags, valid, 0)
+        q = self.q if B == ROOTS else large_array((len(valid), B, description.n))
+        flags = np.zeros(valid.shape, dtype=np.uint8)
+        common = slice(min(B, ROOTS))
+        if B != ROOTS:
+            q[:, common] = self.q[:, common]
+            q[:, ROOTS:] = np.nan
+        flags[:, common] = self.flags[:, common]
         status = np.full(len(q), IKStatus.ok, dtype=np.uint8)
         distance = np.zeros(len(q))
         complete = True
         if others is not None:
             of_others = slice(len(others.branches))
+            q[rows] = np.nan
+            flags[rows] = 0
             q[rows, of_others] = others.q
             flags[rows, of_others] = others.flags
             valid[rows, of_others] = others.valid
@@ -183,15 +186,6 @@ class _SurePoses:
             description=description,
             complete=complete,
         )
-
-
-def _columns(table: NDArray[Any], is_kept: NDArray[np.bool_], filling: float) -> NDArray[Any]:
-    """Return the entries (N, B, ...) of a table (N, K, ...) that are kept, shape (N, B), and a filling elsewhere."""
-    columns = np.empty((*is_kept.shape, *table.shape[2:]), dtype=table.dtype)
-    common = min(is_kept.shape[1], table.shape[1])
-    columns[:, :common] = table[:, :common]
-    columns[~is_kept] = filling
-    return columns
 
 
 def _flags_and_counts(outputs: list[Array], q: Array) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:

@@ -46,7 +46,7 @@ _SX: TypeAlias = Any
 RESULTS = ("sorted_q", "sorted_is_outside", "sorted_details", "verdict", "error")
 """Outputs of a pose's program; the roots are sorted by their joint values, and those without a solution are the last.
 
-- joint values, 16 times 6, rad;
+- joint values, 16 times 6, rad, NaN where there is no solution;
 - whether a joint is outside its limits, 16 times;
 - details of the root, 16 times 4: what is known of it, as the sum of ``IS_TRIED``, ``IS_REAL``, ``IS_BESIDE`` and
   ``IS_DELICATE``; the error of its joint values; its angle, rad; and a number that the way of elimination reads, 0
@@ -112,7 +112,11 @@ def solving_steps(
             skips="sorted_is_idle",
         ),
         _sorted(
-            parameters, "sorted_solutions", "key", {name: sizes[name] for name in _OF_SOLUTION}
+            parameters,
+            "sorted_solutions",
+            "key",
+            {name: sizes[name] for name in _OF_SOLUTION},
+            missing=("q", "kind"),
         ),
         _verdict(parameters),
     )
@@ -192,7 +196,13 @@ def _verdict(parameters: _SX) -> PipelineStep:
     )
 
 
-def _sorted(parameters: _SX, name: str, key: str, sizes: Mapping[str, int]) -> PipelineStep:
+def _sorted(
+    parameters: _SX,
+    name: str,
+    key: str,
+    sizes: Mapping[str, int],
+    missing: tuple[str, str] | None = None,
+) -> PipelineStep:
     """Return the step that sorts roots by a key, with outputs ``sorted_...`` for those of earlier steps.
 
     Parameters
@@ -205,6 +215,8 @@ def _sorted(parameters: _SX, name: str, key: str, sizes: Mapping[str, int]) -> P
         Output of an earlier step: a number of each root.
     sizes
         Numbers of entries of the outputs that are sorted, by their names.
+    missing
+        An output that becomes NaN, and the one with the kind of a root, where that is ``NONE``.
     """
     index = ca.SX.sym("index")
     own = ca.SX.sym("own_key")
@@ -213,6 +225,9 @@ def _sorted(parameters: _SX, name: str, key: str, sizes: Mapping[str, int]) -> P
     values = {source: ca.SX.sym(source, size) for source, size in sizes.items()}
     inputs = {"parameters": parameters, "index": index, "own_key": own, "keys": keys, **values}
     outputs = {f"sorted_{source}": value for source, value in values.items()}
+    if missing:
+        joints, kind = missing
+        outputs[f"sorted_{joints}"] = ca.if_else(values[kind] != NONE, values[joints], math.nan)
     return PipelineStep(
         Graph.of(name, inputs, {**outputs, "place": place}),
         ROOTS,
