@@ -43,7 +43,7 @@ from dhkit.kinematics.polynomial.estimate_steps import (
 )
 from dhkit.kinematics.polynomial.extension import Extension, Root
 from dhkit.kinematics.polynomial.pose_steps import place_in_order
-from dhkit.kinematics.polynomial.roots_program import (
+from dhkit.kinematics.polynomial.root_symbols import (
     BEYOND as NO_ANGLE,
     coefficients,
     complex_of,

@@ -20,11 +20,7 @@ from typing import Any, TypeAlias
 import casadi as ca
 
 from dhkit.kinematics.polynomial.extension import Extension
-from dhkit.kinematics.polynomial.roots_program import (
-    CONVERGED,
-    FIRST_ANGLE,
-    FIRST_RADII,
-    MOST_STEPS,
+from dhkit.kinematics.polynomial.root_symbols import (
     ROUNDING,
     complex_of,
     polynomial_of,
@@ -34,12 +30,19 @@ from dhkit.symbolic import Graph, PipelineStep
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
+_MOST_STEPS = 60
+"""Largest number of steps; most polynomials take 5 to 10."""
+_CONVERGED = 1e-7
+"""Estimates at which Newton's steps are below this share of their absolute value are foreseen to rounding."""
+_FIRST_RADII = (0.95, 1.05)
+_FIRST_ANGLE = 0.4
+"""The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps would keep both."""
 _LARGEST_STEP = 0.05
 """Newton's steps that are longer than this share of |z| are not foreseen: far from a root they lead anywhere."""
 _SHORTER = 32.0
 """The number s of such steps."""
 _SURELY_COMPLEX = 0.02
-"""Steps below this share of the distance to the unit circle do not matter: the root is not on it."""
+"""Where Newton's step is below this share of the distance to the unit circle, the root is not on it."""
 _INFINITE = 1e300
 _STATE = ("z_x", "z_y", "newton_x", "newton_y", "is_short")
 """What an estimate's next step follows from, besides the other estimates."""
@@ -177,10 +180,10 @@ def _first_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
     symbols = _Symbols.of(parameters, source)
     index = ca.SX.sym("index")
     is_odd = index - 2.0 * ca.floor(index / 2.0) > 0.5
-    radius = ca.if_else(is_odd, FIRST_RADII[1], FIRST_RADII[0])
-    angle = FIRST_ANGLE + index * (math.tau / source.roots)
+    radius = ca.if_else(is_odd, _FIRST_RADII[1], _FIRST_RADII[0])
+    angle = _FIRST_ANGLE + index * (math.tau / source.roots)
     z = complex_of(radius * ca.cos(angle), radius * ca.sin(angle))
-    inner, outer = ((n - 1) / 2 + n * r**n / sum(R**n for R in FIRST_RADII) for r in FIRST_RADII)
+    inner, outer = ((n - 1) / 2 + n * r**n / sum(R**n for R in _FIRST_RADII) for r in _FIRST_RADII)
     repulsion = z.inverse * ca.if_else(is_odd, outer, inner)
 
     moved = symbols.estimate(z - symbols.estimate(z).step(repulsion))
@@ -203,11 +206,11 @@ def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep
     step = before.step_of_all(_repulsion([z - complex_of(x, y) for x, y in all_roots]))
     moved = symbols.estimate(z - step)
 
-    square = _square(step)
+    # A root is within 2 n |N| of z, n the degree (Laguerre). |z|^2 - 1 is about twice the distance to the circle.
+    square = _square(moved.newton)
     height = _square(moved.z) - 1.0
-    # |z|^2 - 1 is about twice the distance to the circle.
     is_far = square < (_SURELY_COMPLEX / 2) ** 2 * height * height
-    has_converged = ca.logic_or(is_far, square < CONVERGED**2 * _square(moved.z))
+    has_converged = ca.logic_or(is_far, square < _CONVERGED**2 * _square(moved.z))
     stays = ca.logic_or(moved.is_root, has_converged)
     inputs = {**symbols.inputs, **own, "xs": xs, "ys": ys}
     outputs = {**moved.outputs(source), "goes_on": ca.if_else(stays, 0.0, 1.0)}
@@ -216,7 +219,7 @@ def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep
         source.roots,
         each={name: source.own(name) for name in _STATE},
         shared={**symbols.shared, "xs": source.x, "ys": source.y},
-        most=MOST_STEPS,
+        most=_MOST_STEPS,
     )
 
 

@@ -180,8 +180,8 @@ class General:
             for angle in angles()
         ]
         # The determinant is real up to a constant factor of absolute value 1.
-        roots = real_roots((np.array(values).T * self._phase).real)
-        of_root, q = self._joints_at_roots(motions, side, roots.owner, roots.angle + _FIRST_ANGLE)
+        roots = real_roots((np.array(values).T * self._phase).real, _FIRST_ANGLE)
+        of_root, q = self._joints_at_roots(motions, side, roots.owner, roots.angle)
         owner = roots.owner[of_root]
         error = magnitude(self.newton.error(q, poses[owner]))
         is_near = roots.is_delicate

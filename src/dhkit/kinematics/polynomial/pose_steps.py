@@ -15,7 +15,7 @@ from dhkit.kinematics.polynomial.estimate_steps import (
     total_of,
 )
 from dhkit.kinematics.polynomial.extension import Extension
-from dhkit.kinematics.polynomial.roots_program import (
+from dhkit.kinematics.polynomial.root_symbols import (
     BEYOND,
     NEAR_ROOTS,
     coefficients,
@@ -39,7 +39,8 @@ from dhkit.kinematics.polynomial.trigonometric import (
     SOLUTION,
 )
 from dhkit.kinematics.solutions import LIMIT_SLACK
-from dhkit.symbolic import Graph, PipelineStep
+from dhkit.symbolic import Graph, Pipeline, PipelineStep
+from dhkit.symbolic.programs.graph import Variable
 
 _SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
@@ -84,6 +85,17 @@ def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
         _angles(parameters),
         _sorted(parameters, "sorted_roots", "is_idle", dict.fromkeys((*_OF_ROOT, "is_idle"), 1)),
     )
+
+
+def roots_program() -> Pipeline:
+    """Return the program from the values of a polynomial, and their first angle, to what is known of its roots.
+
+    The outputs are those of :func:`root_steps` before they are sorted.
+    """
+    parameters = ca.SX.sym("none")
+    inputs = (Variable("parameters", (1,)), Variable("value", (SAMPLES,)), Variable("first", (1,)))
+    *steps, _ = root_steps(parameters)
+    return Pipeline("trigonometric_roots", inputs, tuple(steps), (*_OF_ROOT, "error"))
 
 
 def solving_steps(

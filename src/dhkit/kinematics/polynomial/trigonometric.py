@@ -8,20 +8,21 @@ lie in pairs z and 1 / conj(z).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels import Kernel, kernel
-from dhkit.symbolic import Loop
+
+if TYPE_CHECKING:
+    from dhkit.symbolic import Pipeline
 
 DEGREE = 8
 ROOTS = 2 * DEGREE
 SAMPLES = 20
 """Number of values. 17 would do; the other coefficients then tell how exactly the values are a polynomial's."""
-_LARGEST_ANGLE = 3.5
-"""No root has a larger angle, rad; the program writes 4 for a root that is not nearly real."""
 _WELL_KNOWN = 1e-12
 """Error of the coefficients above which every root that is nearly real counts as one; usually it is some 1e-15."""
 _NO_PARAMETERS = np.zeros(1)
@@ -59,39 +60,40 @@ class Roots:
     owner: NDArray[np.intp]
     """Index of the polynomial of each root, shape (K,), in ascending order."""
     angle: Array
-    """The root's real part, shape (K,), rad, in [-pi, pi], less the first angle."""
+    """The root's real part, shape (K,), rad."""
     expected: NDArray[np.intp]
     """Number of roots of each polynomial that are real up to their errors, shape (N,); at least 1 if some are nearly
     real, and all that are nearly real if the polynomial is not well known."""
     is_delicate: NDArray[np.bool_]
-    """Whether two real roots of a polynomial nearly coincide, shape (N,)."""
+    """Whether two roots of a polynomial nearly coincide, or have the same real part, shape (N,)."""
     error: Array
     """Largest coefficient beyond degree 8 of each polynomial, relative to the others, shape (N,); NaN or infinite where
     the values are not finite, or are all 0."""
 
 
-def real_roots(values: Array) -> Roots:
+def real_roots(values: Array, first: float) -> Roots:
     """Return the real roots of polynomials, and those that are nearly real.
 
     Parameters
     ----------
     values
         Values at equally spaced angles, shape (N, SAMPLES).
+    first
+        The first angle, rad.
     """
     count = len(values)
-    angle = np.empty((count, ROOTS))
-    is_real = np.empty((count, ROOTS))
-    is_delicate = np.empty((count, 1))
+    angle, is_tried, is_real, closeness = (np.empty((count, ROOTS)) for _ in range(4))
     error = np.empty((count, 1))
     run = roots_kernel()
-    rows = np.ascontiguousarray(values)
-    run(_NO_PARAMETERS, [rows], [angle, is_real, is_delicate, error])
+    inputs = [np.ascontiguousarray(values), np.full((count, 1), first)]
+    run(_NO_PARAMETERS, inputs, [angle, is_tried, is_real, closeness, error])
 
     # NaN, where values are not finite, is no root.
-    is_near = angle < _LARGEST_ANGLE
+    is_near = is_tried > 0.0
     owner, _ = np.nonzero(is_near)
-    expected = expected_roots(is_near, is_real > 0, error)
-    return Roots(owner, angle[is_near], expected, is_delicate[:, 0] > 0, error[:, 0])
+    expected = expected_roots(is_near, is_real > 0.0, error)
+    is_delicate = np.asarray((closeness > 0.0).any(axis=1))
+    return Roots(owner, angle[is_near], expected, is_delicate, error[:, 0])
 
 
 def expected_roots(
@@ -114,12 +116,12 @@ def expected_roots(
 
 
 def roots_kernel() -> Kernel:
-    """Return the kernel of :func:`dhkit.kinematics.polynomial.roots_program.roots_program`."""
+    """Return the kernel of :func:`dhkit.kinematics.polynomial.pose_steps.roots_program`."""
 
-    def derived() -> Loop:
-        from dhkit.kinematics.polynomial.roots_program import roots_program
+    def derived() -> Pipeline:
+        from dhkit.kinematics.polynomial.pose_steps import roots_program
 
-        return roots_program(DEGREE, SAMPLES)
+        return roots_program()
 
     pattern = f"{DEGREE} {SAMPLES}"
-    return kernel("trigonometric_roots", pattern, derived, ("float64",) * 4, is_loop=True)
+    return kernel("trigonometric_roots", pattern, derived, ("float64",) * 5)

@@ -1,21 +1,14 @@
-"""Program from values of a trigonometric polynomial to its real roots: coefficients, Aberth's method, what is real.
-
-It solves a polynomial in each lane, for values that come in batches, such as determinants by LAPACK. Programs for one
-pose have a root in each lane, see :mod:`dhkit.kinematics.polynomial.pose_steps`.
-"""
+"""Trigonometric polynomials and their roots in symbols: coefficients, values, which roots are real."""
 
 from __future__ import annotations
 
-import cmath
 import math
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any, TypeAlias
 
 import casadi as ca
 
 from dhkit.kinematics.polynomial.extension import Extension, Root
-from dhkit.symbolic import Graph, Loop
 
 SX: TypeAlias = Any
 """A CasADi SX scalar or vector."""
@@ -23,13 +16,6 @@ SX: TypeAlias = Any
 BEYOND = 4.0
 """Stands for the angle of a root that is not nearly real, rad: no angle is beyond pi."""
 _IMAGINARY_UNIT = Root(-1.0)
-MOST_STEPS = 60
-"""Largest number of Aberth's steps; most polynomials take 7 to 12."""
-CONVERGED = 1e-7
-"""Estimates whose last steps are below this share of their absolute value are roots: steps shrink by their cubes."""
-FIRST_RADII = (0.95, 1.05)
-FIRST_ANGLE = 0.4
-"""The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps would keep both."""
 ROUNDING = 4e-15
 """A value below this share of the sum of the terms' absolute values is rounding: its estimate is a root."""
 _NEARLY_REAL = 3e-2
@@ -46,67 +32,6 @@ _MARGIN = 1e4
 _PARTS = 4
 NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
-
-
-def roots_program(degree: int, samples: int) -> Loop:
-    """Return the program: values at equally spaced angles to what is known of the 2 ``degree`` roots.
-
-    The outputs are, with z = e^(i (angle + i height)):
-
-    - ``angle``, rad, in [-pi, pi]; ``BEYOND`` for a root whose height is beyond ``_NEARLY_REAL``, or which is not real
-      even if the error of f is ``_MARGIN`` times the assumed one;
-    - ``is_real``, whether f at the real angle is 0 up to its error, or hardly larger than the coefficients' error;
-    - ``is_delicate``, one number: whether two roots nearly coincide, so that a solution may be singular;
-    - ``error``, one number: the largest coefficient beyond the degree, relative to the others; infinite for values that
-      are all 0.
-    """
-    parameters = ca.SX.sym("none")
-    values = ca.SX.sym("values", samples)
-    inputs: dict[str, SX] = {"parameters": parameters, "values": values}
-    numbers, error = coefficients(values, degree)
-    first = _Roots.first(degree)
-    outputs: dict[str, SX] = {"state": first.vector, "fixed": ca.vertcat(numbers, error)}
-    begin = Graph.of("roots_begin", inputs, outputs)
-
-    fixed = ca.SX.sym("fixed", 2 * degree + 2)
-    state = ca.SX.sym("state", 4 * degree)
-    within = {**inputs, "fixed": fixed, "state": state}
-    polynomial = polynomial_of(fixed[:-1], degree)
-    roots = _Roots.read(state)
-    after, step = _stepped(polynomial, roots)
-    goes_on = ca.if_else(step >= CONVERGED, 1.0, 0.0)
-    step_graph = Graph.of("roots_step", within, {"state": after.vector, "goes_on": goes_on})
-
-    finish = Graph.of("roots", within, _real_roots(polynomial, roots, fixed[-1]))
-    return Loop(begin, step_graph, finish, MOST_STEPS, in_lanes=True)
-
-
-@dataclass(frozen=True)
-class _Roots:
-    """Estimates of the roots."""
-
-    z: list[Extension]
-
-    @classmethod
-    def first(cls, degree: int) -> _Roots:
-        """Return the first estimates."""
-        count = 2 * degree
-        numbers = [
-            cmath.rect(FIRST_RADII[k % 2], FIRST_ANGLE + math.tau / count * k) for k in range(count)
-        ]
-        return cls([complex_of(ca.SX(z.real), ca.SX(z.imag)) for z in numbers])
-
-    @classmethod
-    def read(cls, state: SX) -> _Roots:
-        """Return the estimates of a state: their real parts, then their imaginary parts."""
-        entries = ca.vertsplit(state)
-        count = len(entries) // 2
-        return cls([complex_of(entries[k], entries[count + k]) for k in range(count)])
-
-    @property
-    def vector(self) -> SX:
-        """The estimates as a state."""
-        return ca.vertcat(*(z.x for z in self.z), *(z.y for z in self.z))
 
 
 def coefficients(values: SX, degree: int) -> tuple[SX, SX]:
@@ -132,87 +57,12 @@ def coefficients(values: SX, degree: int) -> tuple[SX, SX]:
     return numbers, ca.if_else(largest > 0, beyond * factor, math.inf)
 
 
-def _stepped(polynomial: list[Extension], roots: _Roots) -> tuple[_Roots, SX]:
-    """Return the estimates after a step of Aberth's method, and the largest step as a share of |z|."""
-    sums = [complex_of(ca.SX(0.0), ca.SX(0.0)) for _ in roots.z]
-    for i, root in enumerate(roots.z):
-        for j in range(i):
-            one_over = (root - roots.z[j]).inverse
-            sums[i] = sums[i] + one_over
-            sums[j] = sums[j] - one_over
-
-    sizes = sizes_of(polynomial)
-    both = [
-        aberth_step(polynomial, sizes, root, repulsion)
-        for root, repulsion in zip(roots.z, sums, strict=True)
-    ]
-    return _Roots([moved for moved, _ in both]), reduce(ca.fmax, (step for _, step in both))
-
-
-def aberth_step(
-    polynomial: list[Extension], sizes: list[SX], root: Extension, repulsion: Extension
-) -> tuple[Extension, SX]:
-    """Return an estimate after a step of Aberth's method, and the step as a share of |z|.
-
-    The estimate moves by
-
-        -p / (p' - p sum_j 1 / (z - z_j)),
-
-    which is Newton's step for p over the product of all other z - z_j (Aberth 1973, Math. Comp. 27). A step counts as 0
-    where p is 0 up to rounding, as it is in a whole neighbourhood of a double root.
-
-    Parameters
-    ----------
-    polynomial, sizes
-        Coefficients, highest first, and their absolute values.
-    root
-        The estimate z.
-    repulsion
-        The sum of 1 / (z - z_j) over the other estimates.
-    """
-    p, slope = value_and_slope(polynomial, root)
-    step = p * (slope - p * repulsion).inverse
-    length = ca.sqrt(step.x * step.x + step.y * step.y)
-    is_finite = length < 1e300
-    step = complex_of(ca.if_else(is_finite, step.x, 0.0), ca.if_else(is_finite, step.y, 0.0))
-
-    radius = ca.sqrt(root.x * root.x + root.y * root.y)
-    largest = reduce(lambda value, size: value * radius + size, sizes)
-    is_root = ca.fabs(p.x) + ca.fabs(p.y) < ROUNDING * largest
-    return root - step, ca.if_else(is_root, 0.0, length / radius)
-
-
-def _real_roots(polynomial: list[Extension], roots: _Roots, error: SX) -> dict[str, SX]:
-    """Return the outputs of :func:`roots_program`."""
-    near = []
-    heights = []
-    are_real = []
-    for root in roots.z:
-        angle, height, is_real = nearly_real(polynomial, root, error)
-        near.append(angle)
-        heights.append(height)
-        are_real.append(is_real)
-
-    is_delicate = ca.SX(0.0) > 0.0
-    for i, root in enumerate(roots.z):
-        for j in range(i):
-            is_near = square_of_distance(root, roots.z[j]) < NEAR_ROOTS**2
-            is_delicate = ca.logic_or(is_delicate, ca.logic_and(is_near, heights[i] < NEAR_ROOTS))
-    return {
-        "angle": ca.vertcat(*near),
-        "is_real": ca.vertcat(*are_real),
-        "is_delicate": ca.if_else(is_delicate, 1.0, 0.0),
-        "error": error,
-    }
-
-
-def sizes_of(polynomial: list[Extension]) -> list[SX]:
-    """Return the absolute values of coefficients."""
-    return [ca.sqrt(c.x * c.x + c.y * c.y) for c in polynomial]
-
-
 def nearly_real(polynomial: list[Extension], root: Extension, error: SX) -> tuple[SX, SX, SX]:
-    """Return angle, height and whether it is real of a root, as :func:`roots_program` has them.
+    """Return angle, height and whether it is real of a root, of z = e^(i (angle + i height)).
+
+    The angle is ``BEYOND`` for a root whose height is beyond ``_NEARLY_REAL``, or which is not real even if the error
+    of f is ``_MARGIN`` times the assumed one. A root is real if f at the real angle is 0 up to its error, or hardly
+    larger than the coefficients' error, so that real and complex roots are not told apart.
 
     Parameters
     ----------
