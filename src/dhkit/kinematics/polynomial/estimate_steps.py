@@ -206,10 +206,11 @@ def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep
     step = before.step_of_all(_repulsion([z - complex_of(x, y) for x, y in all_roots]))
     moved = symbols.estimate(z - step)
 
-    # A root is within 2 n |N| of z, n the degree (Laguerre). |z|^2 - 1 is about twice the distance to the circle.
+    # A root is within 2 n |N| of z, n the degree (Laguerre). | |z|^2 - 1 | is about twice the distance to the circle,
+    # and where it is larger than 1, so is that.
     square = _square(moved.newton)
     height = _square(moved.z) - 1.0
-    is_far = square < (_SURELY_COMPLEX / 2) ** 2 * height * height
+    is_far = square < (_SURELY_COMPLEX / 2) ** 2 * ca.fmin(height * height, 1.0)
     has_converged = ca.logic_or(is_far, square < _CONVERGED**2 * _square(moved.z))
     stays = ca.logic_or(moved.is_root, has_converged)
     inputs = {**symbols.inputs, **own, "xs": xs, "ys": ys}
