@@ -21,8 +21,10 @@ from dhkit.kinematics.eliminated import (
     solve_by_elimination,
 )
 from dhkit.kinematics.eliminated_call import EliminatedPoseCall, are_different
+from dhkit.kinematics.polynomial.general import CompiledGeneral
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import SAME_ANGLE, are_distinct, solve
+from dhkit.kinematics.polynomial.trigonometric import DEGREE, ROOTS, SAMPLES, real_roots
 from dhkit.kinematics.polynomial.two_parallel_pose import pose_program
 from dhkit.symbolic import operation_count
 from ssik_peer import solutions_of
@@ -239,7 +241,7 @@ def test_a_pose_that_was_made_is_never_said_to_be_out_of_reach(name, law):
     assert closure(arm, found, arm.fk(q)) < 1e-8
 
 
-def test_a_step_of_aberths_method_divides_four_times():
+def test_a_step_of_the_estimates_divides_four_times():
     """Of the differences of the roots it takes one reciprocal for eight, unless CasADi undoes it."""
     steps = {step.graph.name: step.graph for step in pose_program((5, 6)).with_reciprocals().steps}
     assert operation_count(steps["better_estimates"])["divisions"] == 4
@@ -671,3 +673,34 @@ def test_equal_solutions_of_a_call_are_those_of_a_batch():
         q = np.angle(np.exp(1j * q))
         is_one = are_distinct(q, np.zeros(count, dtype=np.intp))
         assert are_different(q) == is_one.all()
+
+
+@pytest.mark.law
+@pytest.mark.parametrize("name", ALL)
+def test_real_eigenvalues_of_a_companion_matrix_are_among_the_roots(name, law):
+    """LAPACK's eigenvalues that lie on the unit circle, 1e-3 from any other."""
+    arm = ALL[name]
+    count = law.samples(20_000, quick=300)
+    T = arm.fk(np.random.default_rng(31).uniform(-np.pi, np.pi, (count, 6)))
+    way = next(x for x in six_joints(arm.description).ways if isinstance(x, CompiledGeneral))
+    values = way.lapack.polynomial_values(T.reshape(-1, 16))
+    found = real_roots(values, 0.0)
+
+    upper = np.fft.fft(values, axis=1)[:, DEGREE::-1] / SAMPLES
+    coefficients = np.concatenate([upper, upper[:, -2::-1].conj()], axis=1)
+    companion = np.zeros((count, ROOTS, ROOTS), dtype=complex)
+    companion[:, 0] = -coefficients[:, 1:] / coefficients[:, :1]
+    companion[:, np.arange(1, ROOTS), np.arange(ROOTS - 1)] = 1.0
+    eigenvalues = np.linalg.eigvals(companion)
+
+    apart = np.abs(eigenvalues[:, :, None] - eigenvalues[:, None]) + 10.0 * np.eye(ROOTS)
+    is_real = np.abs(np.log(np.abs(eigenvalues))) < 1e-9
+    owner, place = np.nonzero(is_real & (apart.min(axis=2) > 1e-3))
+    nearest = np.full(len(owner), np.inf)
+    starts = np.searchsorted(found.owner, np.arange(count + 1))
+    for k in range(int(np.diff(starts).max())):
+        index = np.minimum(starts[owner] + k, len(found.owner) - 1)
+        away = np.abs(np.exp(1j * found.angle[index]) - eigenvalues[owner, place])
+        nearest = np.where(found.owner[index] == owner, np.minimum(nearest, away), nearest)
+    assert len(owner) > count / 10
+    law.holds("real roots missed", int(np.sum(nearest > 1e-6)), 0, name)

@@ -175,12 +175,7 @@ class General:
         """Return joint values at the roots of the polynomial of poses, shape (N, 16), m."""
         motions = self._motions(poses)
         side = self._reduced(motions)
-        values = [
-            np.linalg.det(_matrix(side.six, np.full(len(poses), _FIRST_ANGLE + angle)))
-            for angle in angles()
-        ]
-        # The determinant is real up to a constant factor of absolute value 1.
-        roots = real_roots((np.array(values).T * self._phase).real, _FIRST_ANGLE)
+        roots = real_roots(self._values(side), _FIRST_ANGLE)
         of_root, q = self._joints_at_roots(motions, side, roots.owner, roots.angle)
         owner = roots.owner[of_root]
         error = magnitude(self.newton.error(q, poses[owner]))
@@ -196,6 +191,21 @@ class General:
             is_near,
             roots.error,
         )
+
+    def polynomial_values(self, poses: Array) -> Array:
+        """Return the values of the polynomial of poses (N, 16), m, at equally spaced angles, shape (N, SAMPLES)."""
+        return self._values(self._reduced(self._motions(poses)))
+
+    def _values(self, side: _FarSide) -> Array:
+        """Return the values of the polynomials at equally spaced angles, shape (N, SAMPLES)."""
+        count = len(side.constant)
+        values = [
+            np.linalg.det(_matrix(side.six, np.full(count, _FIRST_ANGLE + angle)))
+            for angle in angles()
+        ]
+        # The determinant is real up to a constant factor of absolute value 1.
+        real: Array = (np.array(values).T * self._phase).real
+        return real
 
     def candidates_at(self, results: PoseResults, poses: Array) -> Candidates:
         """Return joint values at the roots that the elimination's program found at poses, shape (N, 16), m.
