@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import TypeAlias
@@ -32,6 +33,7 @@ Intervals: TypeAlias = list[tuple[float, float]]
 """Beginning and end of each interval, rad."""
 _COUNTS_AS = 20
 """Calls that an interpreted one counts as: it takes up to 20 ms, compiled 50 us."""
+_HIGHEST_BYTES = slice(7 if sys.byteorder == "little" else 0, None, 8)
 _AGREEMENT = 1e-3
 """Largest difference of compiled from interpreted ends, rad: roots amplify rounding where two nearly coincide."""
 
@@ -68,7 +70,7 @@ class IntervalsByRoots:
         self._limits: tuple[float, float] | None = None
         if not is_arm_angle and np.isfinite([numbers.lower[last], numbers.upper[last]]).all():
             self._limits = (float(numbers.lower[last]), float(numbers.upper[last]))
-        self._packed = struct.Struct(f"{self._parts + 1}d")
+        self._state = struct.Struct(f"{8 * self._parts}xd")
 
         def derived() -> Pipeline:
             # With CasADi, which takes time to import.
@@ -102,7 +104,7 @@ class IntervalsByRoots:
     def _are_alike(self, found: Sequence[Array], expected: Sequence[Array]) -> bool:
         """Return whether two results lead to the same intervals; roots that bound nothing may differ."""
         one, other = (
-            self._intervals(begins.ravel().tolist(), are_inside.ravel().tolist(), state.item())
+            self._intervals(begins.ravel(), are_inside.tobytes(), state.item())
             for begins, are_inside, state in (found, expected)
         )
         return np.shape(one) == np.shape(other) and np.allclose(one, other, rtol=0, atol=_AGREEMENT)
@@ -124,21 +126,22 @@ class IntervalsByRoots:
         if begins.ndim != 1:
             # The function takes several poses as well.
             return None
-        *are_inside, state = self._packed.unpack(packed)
+        (state,) = self._state.unpack(packed)
         if math.isnan(state):
             # An entry of T is not finite.
             return None
-        return state, self._intervals(begins.tolist(), are_inside, state)
+        return state, self._intervals(begins, packed, state)
 
     def interpreted(self, T: Array) -> tuple[float, Intervals]:
         """Return state and intervals at a pose, shape (4, 4), m."""
         begins, are_inside, state = (np.empty((1, size)) for size in (self._parts, self._parts, 1))
         self._kernel(self._parameters, [T.reshape(1, 16)], [begins, are_inside, state])
         known = state.item()
-        return known, self._intervals(begins[0].tolist(), are_inside[0].tolist(), known)
+        return known, self._intervals(begins[0], are_inside.tobytes(), known)
 
-    def _intervals(self, begins: list[float], are_inside: list[float], state: float) -> Intervals:
+    def _intervals(self, begins: Array, packed: bytes, state: float) -> Intervals:
+        """Return the intervals, from the numbers 1 and 0 of the parts that ``packed`` begins with."""
         if state != KNOWN:
             return []
-        intervals = joined(begins, are_inside)
+        intervals = joined(begins, packed[_HIGHEST_BYTES][: self._parts])
         return intervals if self._limits is None else unrolled(intervals, *self._limits)

@@ -6,6 +6,7 @@ See :mod:`dhkit.kinematics.arm_angle_program` and :mod:`dhkit.kinematics.joint_7
 from __future__ import annotations
 
 import math
+import struct
 from bisect import bisect_left
 from collections.abc import Sequence
 
@@ -29,6 +30,8 @@ JOINT_7_PARTS = 152
 KNOWN, UNKNOWN, BEYOND, NO_POSE = range(4)
 """States; ``UNKNOWN``: of an arm angle, the outer joints of the shoulder or of the wrist turn about one line at every
 value; of joint 7, the polynomials are not known well enough."""
+OUTSIDE, INSIDE = (struct.pack("<d", value)[-1:] for value in (0.0, 1.0))
+"""The bytes that tell the numbers 0 and 1 apart, the highest of each."""
 TOUCHING = 1e-12
 """Share by which a root may be missed by rounding, and angle, rad, between two that are taken as one."""
 
@@ -49,30 +52,40 @@ def interval_parameters(fit: Fit, offset: Array, lower: Array, upper: Array) -> 
     return np.concatenate([fit.vector(), *turns, *np.cos(limits), *np.sin(limits)])
 
 
-def joined(begins: Sequence[float], are_inside: Sequence[float]) -> list[tuple[float, float]]:
+def joined(begins: Array, are_inside: bytes) -> list[tuple[float, float]]:
     """Return the intervals of parts, neighbours joined.
 
     Parameters
     ----------
-    begins, are_inside
-        Where the parts begin, rad, and whether the arm is inside its limits in them.
+    begins
+        Where the parts begin, shape (K,), rad.
+    are_inside
+        Whether the arm is inside its limits in them: ``INSIDE`` or ``OUTSIDE`` for each.
     """
-    intervals = []
-    start = None
+    at = begins.item
     # Those that begin at pi are empty.
-    count = bisect_left(begins, math.pi) + 1
-    begins = begins[:count]
-    for begin, end, is_inside in zip(begins, begins[1:], are_inside, strict=False):
-        if end - begin <= TOUCHING:
+    count = bisect_left(begins, math.pi)
+    intervals = []
+    first = are_inside.find(INSIDE, 0, count)
+    while first >= 0:
+        if _is_empty(begins, first):
+            first = are_inside.find(INSIDE, first + 1, count)
             continue
-        if is_inside and start is None:
-            start = begin
-        elif not is_inside and start is not None:
-            intervals.append((start, begin))
-            start = None
-    if start is not None:
-        intervals.append((start, math.pi))
+        after = are_inside.find(OUTSIDE, first + 1, count)
+        while after >= 0 and _is_empty(begins, after):
+            after = are_inside.find(OUTSIDE, after + 1, count)
+        if after < 0:
+            intervals.append((at(first), math.pi))
+            break
+        intervals.append((at(first), at(after)))
+        first = are_inside.find(INSIDE, after + 1, count)
     return intervals
+
+
+def _is_empty(begins: Array, k: int) -> bool:
+    """Return whether a part before the last one is empty, or so small that rounding may have made it."""
+    length: float = begins.item(k + 1) - begins.item(k)
+    return length <= TOUCHING
 
 
 def unrolled(
