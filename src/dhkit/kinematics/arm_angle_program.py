@@ -25,7 +25,7 @@ from dhkit.kinematics.closed_form.family import Fit, Vector
 from dhkit.kinematics.closed_form.formulas import SINGULAR, angle, hypot
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.limit_symbols import ArmSymbols, Limits, wave_root
-from dhkit.kinematics.polynomial.pose_steps import place_in_order
+from dhkit.kinematics.polynomial.root_steps import place_in_order
 from dhkit.kinematics.turn_parts import (
     ARM_ANGLE_PARTS as PARTS,
     BEYOND,

@@ -25,6 +25,7 @@ from dhkit.kinematics.jacobian import jacobian, jacobian_kernel
 from dhkit.kinematics.manipulability import freedoms
 from dhkit.kinematics.newton import Newton, descent_kernel
 from dhkit.kinematics.polynomial.pose_results import OUTPUT_SIZES, PoseProgram, PoseResults
+from dhkit.kinematics.polynomial.root_kinds import ROOTS
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import (
     SAME_ANGLE,
@@ -32,7 +33,6 @@ from dhkit.kinematics.polynomial.solve import (
     are_distinct,
     sorting_key,
 )
-from dhkit.kinematics.polynomial.trigonometric import ROOTS
 from dhkit.kinematics.singular_values import has_small_singular_value
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 

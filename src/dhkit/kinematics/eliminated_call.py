@@ -16,9 +16,9 @@ from dhkit.kernels.background import Background
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.kinematics.eliminated import branch_names, elimination_kernels, has_curves
 from dhkit.kinematics.polynomial.pose_results import OUTPUT_SIZES, PoseProgram
+from dhkit.kinematics.polynomial.root_kinds import ROOTS
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import SAME_SOLUTION
-from dhkit.kinematics.polynomial.trigonometric import ROOTS
 from dhkit.kinematics.solutions import IKFlag, IKSolutions, IKStatus
 
 log = logging.getLogger(__name__)

@@ -42,7 +42,7 @@ from dhkit.kinematics.polynomial.estimate_steps import (
     total_of,
 )
 from dhkit.kinematics.polynomial.extension import Extension, Root
-from dhkit.kinematics.polynomial.pose_steps import place_in_order
+from dhkit.kinematics.polynomial.root_steps import place_in_order
 from dhkit.kinematics.polynomial.root_symbols import (
     BEYOND as NO_ANGLE,
     coefficients,

@@ -28,13 +28,9 @@ from dhkit.kinematics.polynomial.pivots import (
     newton_step,
     not_zero,
 )
-from dhkit.kinematics.polynomial.pose_steps import (
-    RESULTS,
-    known_solutions,
-    root_steps,
-    solving_steps,
-)
-from dhkit.kinematics.polynomial.trigonometric import SAMPLES
+from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, solving_steps
+from dhkit.kinematics.polynomial.root_kinds import SAMPLES
+from dhkit.kinematics.polynomial.root_steps import root_steps
 from dhkit.symbolic import Graph, Pipeline, PipelineStep
 from dhkit.symbolic.programs.graph import Variable
 

@@ -8,17 +8,17 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array
+from dhkit.description import Array, Description
 from dhkit.kernels import Kernel
-from dhkit.kinematics.polynomial.solve import Candidates
-from dhkit.kinematics.polynomial.trigonometric import (
+from dhkit.kinematics.polynomial.root_kinds import (
     IS_BESIDE,
     IS_DELICATE,
     IS_REAL,
     IS_TRIED,
     ROOTS,
-    expected_roots,
 )
+from dhkit.kinematics.polynomial.solve import Candidates, Found, solve_parts
+from dhkit.kinematics.polynomial.trigonometric import expected_roots
 
 _DETAILS = 4
 OUTPUT_SIZES = (6 * ROOTS, ROOTS, _DETAILS * ROOTS, 1, 1)
@@ -113,6 +113,25 @@ class PoseResults:
             np.asarray(self.is_delicate.any(axis=1)),
             self.error_of_polynomial[:, 0],
         )
+
+
+def solve_from(
+    description: Description, program: PoseProgram, results: PoseResults, poses: Array
+) -> Found:
+    """Return the solutions of poses at which an elimination's program has run.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    program, results
+        The elimination, and what it found.
+    poses
+        Shape (N, 16), with orthonormal rotations, m.
+    """
+    return solve_parts(
+        description, lambda some: program.candidates_of(results.at(some), poses[some]), poses
+    )
 
 
 def with_more(

@@ -15,14 +15,13 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.numeric import refined, solve_numerically
 from dhkit.kinematics.polynomial.general import CompiledGeneral, General
-from dhkit.kinematics.polynomial.pose_results import PoseResults
+from dhkit.kinematics.polynomial.pose_results import PoseResults, solve_from
 from dhkit.kinematics.polynomial.solve import (
     MOST,
     Elimination,
     Found,
     distinct,
     solve,
-    solve_from,
 )
 from dhkit.kinematics.polynomial.two_parallel import TwoParallel
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description
 from dhkit.kernels import Kernel
 from dhkit.kinematics.numeric import refined
-
-if TYPE_CHECKING:
-    from dhkit.kinematics.polynomial.pose_results import PoseProgram, PoseResults
 
 _CHUNK = 1_024
 """Poses that are solved together; their arrays take some 10 MB."""
@@ -152,32 +149,23 @@ def solve(
     poses
         Shape (N, 16), with orthonormal rotations, m.
     """
-    return _solved(description, lambda some: candidates(poses[some]), poses)
+    return solve_parts(description, lambda some: candidates(poses[some]), poses)
 
 
-def solve_from(
-    description: Description, program: PoseProgram, results: PoseResults, poses: Array
+def solve_parts(
+    description: Description, candidates: Callable[[slice], Candidates], poses: Array
 ) -> Found:
-    """Return the solutions of poses at which an elimination's program has run.
+    """Return the solutions of poses part by part.
 
     Parameters
     ----------
     description
         The robot.
-    program, results
-        The elimination, and what it found.
+    candidates
+        Returns joint values at the roots of the polynomials of a part of the poses.
     poses
         Shape (N, 16), with orthonormal rotations, m.
     """
-    return _solved(
-        description, lambda some: program.candidates_of(results.at(some), poses[some]), poses
-    )
-
-
-def _solved(
-    description: Description, candidates: Callable[[slice], Candidates], poses: Array
-) -> Found:
-    """Return the solutions of poses (N, 16) from the candidates of chunks of them."""
     q = [np.empty((0, 6))]
     owner = [np.empty(0, dtype=np.intp)]
     may_be_singular = [np.empty(0, dtype=bool)]

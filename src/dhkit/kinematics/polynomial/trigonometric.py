@@ -15,37 +15,14 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.kernels import Kernel, kernel
+from dhkit.kinematics.polynomial.root_kinds import DEGREE, ROOTS, SAMPLES
 
 if TYPE_CHECKING:
     from dhkit.symbolic import Pipeline
 
-DEGREE = 8
-ROOTS = 2 * DEGREE
-SAMPLES = 20
-"""Number of values. 17 would do; the other coefficients then tell how exactly the values are a polynomial's."""
 _WELL_KNOWN = 1e-12
 """Error of the coefficients above which every root that is nearly real counts as one; usually it is some 1e-15."""
 _NO_PARAMETERS = np.zeros(1)
-
-# Kinds of roots. Their sum over a pose's roots is the number of its solutions, with a fraction if some are near.
-NONE = 0.0
-"""It is not real: there is no solution. Outputs of skipped items are 0, so that this has to be 0."""
-SOLUTION = 1.0
-"""There is one solution, and it is not singular."""
-NEAR_SOLUTION = 1.0 + 1.0 / 64
-"""There is one solution, and it is not singular; that of a near root may be the same."""
-DOUBTFUL = 1024.0
-"""It may be real, has several solutions or one that does not close, or nearly coincides with another root."""
-
-# What is known of a root, as bits of a number.
-IS_TRIED = 1
-"""It is nearly real."""
-IS_REAL = 2
-"""It is real up to its error, or may be."""
-IS_BESIDE = 4
-"""Another root is near or at the same angle: their solutions may be the same one, or singular."""
-IS_DELICATE = 8
-"""The solution may be singular, or that of another root."""
 
 
 def angles() -> Array:
@@ -116,10 +93,10 @@ def expected_roots(
 
 
 def roots_kernel() -> Kernel:
-    """Return the kernel of :func:`dhkit.kinematics.polynomial.pose_steps.roots_program`."""
+    """Return the kernel of :func:`dhkit.kinematics.polynomial.root_steps.roots_program`."""
 
     def derived() -> Pipeline:
-        from dhkit.kinematics.polynomial.pose_steps import roots_program
+        from dhkit.kinematics.polynomial.root_steps import roots_program
 
         return roots_program()
 

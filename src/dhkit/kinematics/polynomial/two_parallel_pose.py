@@ -14,13 +14,9 @@ import casadi as ca
 from dhkit.kinematics.closed_form.program import is_pose
 from dhkit.kinematics.descent_program import orthonormal_goal
 from dhkit.kinematics.polynomial.extension import SIGNS
-from dhkit.kinematics.polynomial.pose_steps import (
-    RESULTS,
-    known_solutions,
-    root_steps,
-    solving_steps,
-)
-from dhkit.kinematics.polynomial.trigonometric import SAMPLES
+from dhkit.kinematics.polynomial.pose_steps import RESULTS, known_solutions, solving_steps
+from dhkit.kinematics.polynomial.root_kinds import SAMPLES
+from dhkit.kinematics.polynomial.root_steps import root_steps
 from dhkit.kinematics.polynomial.two_parallel_program import (
     COUNT,
     Numbers,
