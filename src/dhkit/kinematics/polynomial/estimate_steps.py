@@ -115,7 +115,7 @@ class _Estimate:
     newton: Extension
     is_short: _SX
     """Whether Newton's step is short, so that it is foreseen."""
-    is_root: _SX
+    is_rounded: _SX
     """Whether the value is 0 up to rounding, as it is in a whole neighbourhood of a double root."""
 
     @classmethod
@@ -130,12 +130,13 @@ class _Estimate:
             Coefficients, highest first, and the sum of their absolute values.
         """
         p, slope = value_and_slope(polynomial, z)
-        newton = _finite(p * slope.inverse)
+        # Where the slope is 0, any direction leads away.
+        newton = _finite(p * slope.inverse, z)
         square = _square(z)
         is_short = _square(newton) < _LARGEST_STEP**2 * square
         # |p| <= total max(1, |z|)^(2 degree), and its rounding is a share of that.
         largest = total * _power(ca.fmax(1.0, square), len(polynomial) // 2)
-        return cls(z, newton, is_short, ca.fabs(p.x) + ca.fabs(p.y) < ROUNDING * largest)
+        return cls(z, newton, is_short, ca.fabs(p.x) + ca.fabs(p.y) <= ROUNDING * largest)
 
     @property
     def foreseen(self) -> Extension:
@@ -145,12 +146,12 @@ class _Estimate:
     def step(self, repulsion: Extension) -> Extension:
         """Return the step to subtract, with the sum of 1 / (z - u_j) over the others."""
         one = complex_of(ca.SX(1.0), ca.SX(0.0))
-        return _finite(self.newton * (one - self.newton * repulsion).inverse)
+        return _finite(self.newton * (one - self.newton * repulsion).inverse, _zero())
 
     def step_of_all(self, repulsion: Extension) -> Extension:
         """Return the step to subtract, with the sum of 1 / (z - u_j) over all."""
         own = complex_of(ca.if_else(self.is_short, 2.0, 1.0 + _SHORTER), ca.SX(0.0))
-        return _finite(self.newton * (own - self.newton * repulsion).inverse)
+        return _finite(self.newton * (own - self.newton * repulsion).inverse, _zero())
 
     def outputs(self, source: PolynomialSource) -> dict[str, _SX]:
         """Return the state of the iteration, as outputs of a step."""
@@ -210,11 +211,12 @@ def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep
     # and where it is larger than 1, so is that.
     square = _square(moved.newton)
     height = _square(moved.z) - 1.0
-    is_far = square < (_SURELY_COMPLEX / 2) ** 2 * ca.fmin(height * height, 1.0)
-    has_converged = ca.logic_or(is_far, square < _CONVERGED**2 * _square(moved.z))
-    stays = ca.logic_or(moved.is_root, has_converged)
+    may_be_real = square >= (_SURELY_COMPLEX / 2) ** 2 * ca.fmin(height * height, 1.0)
+    # False for NaN.
+    moves = ca.logic_and(may_be_real, square >= _CONVERGED**2 * _square(moved.z))
+    moves = ca.logic_and(moves, ca.logic_not(moved.is_rounded))
     inputs = {**symbols.inputs, **own, "xs": xs, "ys": ys}
-    outputs = {**moved.outputs(source), "goes_on": ca.if_else(stays, 0.0, 1.0)}
+    outputs = {**moved.outputs(source), "goes_on": ca.if_else(moves, 1.0, 0.0)}
     return PipelineStep(
         Graph.of("better_estimates", inputs, outputs),
         source.roots,
@@ -252,7 +254,7 @@ class _Symbols:
 
 def _repulsion(apart: list[Extension]) -> Extension:
     """Return the sum of 1 / z over complex numbers z."""
-    sums = [complex_of(ca.SX(0.0), ca.SX(0.0))] * _SUMS
+    sums = [_zero()] * _SUMS
     for k, (z, over) in enumerate(zip(apart, _reciprocals(list(map(_square, apart))), strict=True)):
         # 1 / z = (x - i y) / |z|^2.
         sums[k % _SUMS] = sums[k % _SUMS] + complex_of(z.x * over, -z.y * over)
@@ -283,15 +285,21 @@ def _products_of_others(numbers: list[_SX]) -> tuple[list[_SX], _SX]:
     return others, lower_product * upper_product
 
 
+def _zero() -> Extension:
+    """Return 0."""
+    return complex_of(ca.SX(0.0), ca.SX(0.0))
+
+
 def _square(z: Extension) -> _SX:
     """Return |z|^2."""
     return z.x * z.x + z.y * z.y
 
 
-def _finite(z: Extension) -> Extension:
-    """Return a number, or 0 where it is none or infinite."""
+def _finite(z: Extension, otherwise: Extension) -> Extension:
+    """Return a number z, or another one where it is none or infinite."""
     is_finite = _square(z) < _INFINITE
-    return complex_of(ca.if_else(is_finite, z.x, 0.0), ca.if_else(is_finite, z.y, 0.0))
+    x = ca.if_else(is_finite, z.x, otherwise.x)
+    return complex_of(x, ca.if_else(is_finite, z.y, otherwise.y))
 
 
 def _power(x: _SX, exponent: int) -> _SX:
