@@ -687,21 +687,30 @@ def test_real_eigenvalues_of_a_companion_matrix_are_among_the_roots(name, law):
     values = way.lapack.polynomial_values(T.reshape(-1, 16))
     found = real_roots(values, 0.0)
 
-    upper = np.fft.fft(values, axis=1)[:, DEGREE::-1] / SAMPLES
+    upper = np.fft.fft(values, axis=1)[:, DEGREE::-1]
     coefficients = np.concatenate([upper, upper[:, -2::-1].conj()], axis=1)
+    coefficients /= np.abs(coefficients).max(axis=1, keepdims=True)
+    # Others have roots near infinity.
+    usable = np.abs(coefficients[:, 0]) > 1e-9
+    if usable.mean() < 0.5:
+        pytest.skip(f"the polynomial of {name} has a lower degree")
     companion = np.zeros((count, ROOTS, ROOTS), dtype=complex)
-    companion[:, 0] = -coefficients[:, 1:] / coefficients[:, :1]
+    companion[usable, 0] = -coefficients[usable, 1:] / coefficients[usable, :1]
     companion[:, np.arange(1, ROOTS), np.arange(ROOTS - 1)] = 1.0
     eigenvalues = np.linalg.eigvals(companion)
 
     apart = np.abs(eigenvalues[:, :, None] - eigenvalues[:, None]) + 10.0 * np.eye(ROOTS)
-    is_real = np.abs(np.log(np.abs(eigenvalues))) < 1e-9
+    is_real = usable[:, None] & (np.abs(np.log(np.abs(eigenvalues) + 1e-300)) < 1e-9)
     owner, place = np.nonzero(is_real & (apart.min(axis=2) > 1e-3))
+    root = eigenvalues[owner, place]
     nearest = np.full(len(owner), np.inf)
     starts = np.searchsorted(found.owner, np.arange(count + 1))
     for k in range(int(np.diff(starts).max())):
         index = np.minimum(starts[owner] + k, len(found.owner) - 1)
-        away = np.abs(np.exp(1j * found.angle[index]) - eigenvalues[owner, place])
+        away = np.abs(np.exp(1j * found.angle[index]) - root)
         nearest = np.where(found.owner[index] == owner, np.minimum(nearest, away), nearest)
+    # Rounding of the coefficients moves a root by 1e-14 over the slope.
+    powers = root[:, None] ** np.arange(ROOTS - 1, -1, -1)
+    slope = np.abs((coefficients[owner, :-1] * np.arange(ROOTS, 0, -1) * powers).sum(axis=1))
     assert len(owner) > count / 10
-    law.holds("real roots missed", int(np.sum(nearest > 1e-6)), 0, name)
+    law.holds("real roots missed", int(np.sum(nearest > 1e-6 + 1e-14 / slope)), 0, name)
