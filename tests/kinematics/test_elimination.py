@@ -22,7 +22,7 @@ from dhkit.kinematics.eliminated import (
 )
 from dhkit.kinematics.eliminated_call import EliminatedPoseCall, are_different
 from dhkit.kinematics.polynomial.general import CompiledGeneral
-from dhkit.kinematics.polynomial.root_kinds import DEGREE, ROOTS, SAMPLES
+from dhkit.kinematics.polynomial.root_kinds import DEGREE, ROOTS
 from dhkit.kinematics.polynomial.six_joints import six_joints
 from dhkit.kinematics.polynomial.solve import SAME_ANGLE, are_distinct, solve
 from dhkit.kinematics.polynomial.trigonometric import real_roots
