@@ -412,3 +412,19 @@ def test_joints_that_a_singularity_leaves_free_come_from_the_seed(name, q):
     assert np.abs(arm.ik(T, seed=q).nearest(q) - q).max() < 1e-9
     path = arm.ik_path(np.repeat(T[None], 3, axis=0), q, limits=False)
     assert path.ok and path.start < 1e-9
+
+
+def test_narrow_intervals_are_found_where_equations_are_not_known_well():
+    """Poses near several singularities; the intervals are narrower than the steps in which they are sampled."""
+    limits = {
+        "lower": [-0.0963, -0.0222, -2.5078, -0.9940, -1.7601, -0.0922, -0.3631],
+        "upper": [0.0963, 0.0222, 0.6615, 0.9940, 1.7601, 0.0922, -0.3118],
+    }
+    arm = SEVEN["Franka Panda"].with_limits(**limits)
+    q = [0.0745181818285851, 0.014759557901796408, -1.046256704765849, 0.3080921798132994]
+    q += [1.2078944383482335, 0.05637581649646592, -0.31904501065750757]
+    T = arm.fk(q)
+    before = arm.redundancy_intervals(T)
+    intervals_by_roots(arm.description).compile()
+    for found in (before, arm.redundancy_intervals(T)):
+        assert np.allclose(found, [(-0.319748, -0.314807)], rtol=0, atol=2e-6)

@@ -142,7 +142,7 @@ def _summary(count: int, flags: bytes, branches: int) -> bytes:
 
 
 def are_different(q: Array) -> bool:
-    """Return whether no two solutions (K, 6) of a pose, rad, are the same."""
+    """Return whether no two solutions (K, 6) of a pose, rad, are the same, as ``are_distinct`` tells of many poses."""
     rows = sorted(q.tolist())
     # Those at -pi once more after those at pi.
     beyond = [[row[0] + math.tau, *row[1:]] for row in rows if row[0] < _BESIDE - math.pi]

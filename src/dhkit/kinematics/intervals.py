@@ -7,7 +7,7 @@ limits, the redundancy is sampled.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,7 +41,8 @@ def redundancy_intervals(
     For other arms, and without limits, the redundancy is tried at steps of half a degree, and the ends are found to
     1e-9 rad: an interval that is narrower than a step may be missing. So is an arm angle where the arm is stretched
     along axis 1, or axis 7, so that joints 1 and 3, or 5 and 7, turn about one line at every angle; and joint 7 where
-    the equations are not known well, at a few poses in a thousand.
+    the equations are not known well, at a few poses in a thousand. There the middles of the intervals that these
+    equations give are tried as well.
 
     Parameters
     ----------
@@ -82,9 +83,10 @@ def redundancy_intervals(
         raise ValueError("T is not a pose; expected a finite position and an orthonormal rotation")
     check_seven(description)
     if by_roots is not None and found is None:
-        state, intervals = by_roots.interpreted(pose)
-        if state in _ANSWERED:
-            return intervals
+        found = by_roots.interpreted(pose)
+        if found[0] in _ANSWERED:
+            return found[1]
+    middles = [] if found is None else [(begin + end) / 2 for begin, end in found[1]]
     solver = AtRedundancy.of(description)
 
     def is_reached(values: Array) -> NDArray[np.bool_]:
@@ -92,16 +94,26 @@ def redundancy_intervals(
         usable = found.allowed if limits else found.valid
         return np.asarray(usable.any(axis=-1))
 
-    return _sampled(is_reached, values_to_try(description))
+    return _sampled(is_reached, values_to_try(description), middles)
 
 
 def _sampled(
-    is_reached: Callable[[Array], NDArray[np.bool_]], tried: Array
+    is_reached: Callable[[Array], NDArray[np.bool_]], tried: Array, middles: Sequence[float]
 ) -> list[tuple[float, float]]:
-    """Return the intervals between the least and the largest of ``tried`` by samples, and their ends by bisection."""
+    """Return the intervals between the least and the largest of ``tried`` by samples, and their ends by bisection.
+
+    Parameters
+    ----------
+    is_reached
+        Returns at which values, shape (N,), the pose is reached.
+    tried
+        Values, rad.
+    middles
+        Further values that are tried.
+    """
     tried = np.sort(tried)
     count = int(np.ceil((tried[-1] - tried[0]) / _STEP)) + 1
-    grid = np.linspace(tried[0], tried[-1], count)
+    grid = np.union1d(np.linspace(tried[0], tried[-1], count), middles)
     inside = is_reached(grid)
     change = np.flatnonzero(inside[1:] != inside[:-1])
     within = np.where(inside[change], grid[change], grid[change + 1])

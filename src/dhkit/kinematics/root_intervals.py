@@ -23,6 +23,7 @@ from dhkit.kinematics.turn_parts import (
     JOINT_7_PARTS,
     KNOWN,
     RESULTS,
+    UNKNOWN,
     interval_parameters,
     joined,
     unrolled,
@@ -55,7 +56,7 @@ def intervals_by_roots(description: Description) -> IntervalsByRoots | None:
 
 
 class IntervalsByRoots:
-    """The intervals of an arm at poses, inside its limits, and the state that tells whether they have a meaning.
+    """The intervals of an arm at poses, inside its limits, and the state that tells whether their ends are known.
 
     See :mod:`dhkit.kinematics.turn_parts` for the states.
     """
@@ -140,8 +141,12 @@ class IntervalsByRoots:
         return known, self._intervals(begins[0], are_inside.tobytes(), known)
 
     def _intervals(self, begins: Array, packed: bytes, state: float) -> Intervals:
-        """Return the intervals, from the numbers 1 and 0 of the parts that ``packed`` begins with."""
-        if state != KNOWN:
+        """Return the intervals, from the numbers 1 and 0 of the parts that ``packed`` begins with.
+
+        Where the equations are not known well, the arm is inside its limits in the middle of these parts, whose ends
+        are anywhere near.
+        """
+        if state not in (KNOWN, UNKNOWN):
             return []
         intervals = joined(begins, packed[_HIGHEST_BYTES][: self._parts])
         return intervals if self._limits is None else unrolled(intervals, *self._limits)

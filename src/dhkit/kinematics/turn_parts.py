@@ -62,7 +62,7 @@ def joined(begins: Array, are_inside: bytes) -> list[tuple[float, float]]:
     are_inside
         Whether the arm is inside its limits in them: ``INSIDE`` or ``OUTSIDE`` for each.
     """
-    at = begins.item
+    begin_of = begins.item
     # Those that begin at pi are empty.
     count = bisect_left(begins, math.pi)
     intervals = []
@@ -75,9 +75,9 @@ def joined(begins: Array, are_inside: bytes) -> list[tuple[float, float]]:
         while after >= 0 and _is_empty(begins, after):
             after = are_inside.find(OUTSIDE, after + 1, count)
         if after < 0:
-            intervals.append((at(first), math.pi))
+            intervals.append((begin_of(first), math.pi))
             break
-        intervals.append((at(first), at(after)))
+        intervals.append((begin_of(first), begin_of(after)))
         first = are_inside.find(INSIDE, after + 1, count)
     return intervals
 

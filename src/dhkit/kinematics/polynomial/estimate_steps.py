@@ -1,14 +1,20 @@
 """Steps of a pipeline to all roots of a trigonometric polynomial at the same time, a root in each lane of vectors.
 
-An estimate z moves by
+An estimate z becomes
 
-    N / (1 - N sum_j 1 / (z - u_j)),    N = p(z) / p'(z),
+    z - N / (1 - N sum_j 1 / (z - u_j)),    N = p(z) / p'(z),
 
-which is Newton's step for p over the product of all other z - u_j (Aberth 1973, Math. Comp. 27). The others count as at
-u_j = z_j - N_j, where Newton's method would take them next: steps then shrink by their fourth powers instead of their
-cubes (Nourein 1977, An improvement on two iteration methods for simultaneous determination of the zeros of a
-polynomial, Int. J. Comput. Math. 6). Of long steps of Newton's method a part is foreseen, u = z - N / s. The sum over
-all roots, the own one too, needs no exception, and has the term s / N more.
+with the sum over the other estimates: Newton's step for p over the product of all z - u_j (Aberth 1973, Math. Comp.
+27). They count as at u_j = z_j - N_j, where Newton's method would take them next: near simple roots errors then shrink
+by their fourth powers instead of their cubes (Nourein 1977, An improvement on two iteration methods for simultaneous
+determination of the zeros of a polynomial, Int. J. Comput. Math. 6).
+
+Far from a root Newton's method leads anywhere. Where |N| is not below 0.05 |z|, u = z - N / s with s = 32, else s = 1.
+So u differs from z, and the sum S over all estimates needs no exception: it has the own term s / N, and the step is
+
+    N / (1 + s - N S).
+
+Where N is 0 that is not finite, and the step is 0.
 """
 
 from __future__ import annotations
@@ -35,15 +41,18 @@ _MOST_STEPS = 60
 _CONVERGED = 1e-7
 """Estimates at which Newton's steps are below this share of their absolute value are foreseen to rounding."""
 _FIRST_RADII = (0.95, 1.05)
+"""The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps keep both symmetries.
+"""
 _FIRST_ANGLE = 0.4
-"""The first estimates are near the circle, but neither on it nor in pairs z, 1 / conj(z): steps would keep both."""
-_LARGEST_STEP = 0.05
-"""Newton's steps that are longer than this share of |z| are not foreseen: far from a root they lead anywhere."""
-_SHORTER = 32.0
-"""The number s of such steps."""
-_SURELY_COMPLEX = 0.02
-"""Where Newton's step is below this share of the distance to the unit circle, the root is not on it."""
+"""Angle of the first one, rad."""
+_SHORT = 0.05
+"""Share of |z| below which Newton's step counts in full, s = 1."""
+_DIVISOR = 32.0
+"""The number s of longer steps."""
+_OFF_CIRCLE = 0.01
+"""Share of min(| |z|^2 - 1 |, 1) below which Newton's step shows that a root is not on the unit circle."""
 _INFINITE = 1e300
+"""Squares of absolute values above it count as infinite."""
 _STATE = ("z_x", "z_y", "newton_x", "newton_y", "is_short")
 """What an estimate's next step follows from, besides the other estimates."""
 _SUMS = 4
@@ -114,7 +123,7 @@ class _Estimate:
     z: Extension
     newton: Extension
     is_short: _SX
-    """Whether Newton's step is short, so that it is foreseen."""
+    """Whether Newton's step is short, so that s = 1."""
     is_rounded: _SX
     """Whether the value is 0 up to rounding, as it is in a whole neighbourhood of a double root."""
 
@@ -133,25 +142,19 @@ class _Estimate:
         # Where the slope is 0, any direction leads away.
         newton = _finite(p * slope.inverse, z)
         square = _square(z)
-        is_short = _square(newton) < _LARGEST_STEP**2 * square
+        is_short = _square(newton) < _SHORT**2 * square
         # |p| <= total max(1, |z|)^(2 degree), and its rounding is a share of that.
         largest = total * _power(ca.fmax(1.0, square), len(polynomial) // 2)
         return cls(z, newton, is_short, ca.fabs(p.x) + ca.fabs(p.y) <= ROUNDING * largest)
 
     @property
     def foreseen(self) -> Extension:
-        """The number u, which is the root if Newton's step is short."""
-        return self.z - self.newton * ca.if_else(self.is_short, 1.0, 1.0 / _SHORTER)
+        """The number u, which is the root once the iteration has ended.
 
-    def step(self, repulsion: Extension) -> Extension:
-        """Return the step to subtract, with the sum of 1 / (z - u_j) over the others."""
-        one = complex_of(ca.SX(1.0), ca.SX(0.0))
-        return _finite(self.newton * (one - self.newton * repulsion).inverse, _zero())
-
-    def step_of_all(self, repulsion: Extension) -> Extension:
-        """Return the step to subtract, with the sum of 1 / (z - u_j) over all."""
-        own = complex_of(ca.if_else(self.is_short, 2.0, 1.0 + _SHORTER), ca.SX(0.0))
-        return _finite(self.newton * (own - self.newton * repulsion).inverse, _zero())
+        Where the value is rounding, so is Newton's step: the estimate stays.
+        """
+        share = ca.if_else(self.is_short, 1.0, 1.0 / _DIVISOR)
+        return self.z - self.newton * ca.if_else(self.is_rounded, 0.0, share)
 
     def outputs(self, source: PolynomialSource) -> dict[str, _SX]:
         """Return the state of the iteration, as outputs of a step."""
@@ -168,7 +171,7 @@ class _Estimate:
 
 
 def _first_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
-    """Return the step with the first estimates of the roots, beside the unit circle inside and outside in turn.
+    """Return the step with the first estimates of the roots, alternately inside and outside the unit circle.
 
     They are the roots of (z^n - r^n a) (z^n + R^n a) with the degree n, the radii r and R and |a| = 1. Half the ratio
     of the second derivative to the first is the sum of 1 / (z - z_j), here
@@ -184,10 +187,12 @@ def _first_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep:
     radius = ca.if_else(is_odd, _FIRST_RADII[1], _FIRST_RADII[0])
     angle = _FIRST_ANGLE + index * (math.tau / source.roots)
     z = complex_of(radius * ca.cos(angle), radius * ca.sin(angle))
-    inner, outer = ((n - 1) / 2 + n * r**n / sum(R**n for R in _FIRST_RADII) for r in _FIRST_RADII)
+    total = sum(r**n for r in _FIRST_RADII)
+    inner, outer = ((n - 1) / 2 + n * r**n / total for r in _FIRST_RADII)
     repulsion = z.inverse * ca.if_else(is_odd, outer, inner)
 
-    moved = symbols.estimate(z - symbols.estimate(z).step(repulsion))
+    one = complex_of(ca.SX(1.0), ca.SX(0.0))
+    moved = symbols.estimate(z - _step(symbols.estimate(z).newton, repulsion, one))
     inputs = {**symbols.inputs, "index": index}
     graph = Graph.of("first_estimates", inputs, moved.outputs(source))
     return PipelineStep(graph, source.roots, each={"index": "index"}, shared=symbols.shared)
@@ -201,17 +206,17 @@ def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep
     ys = ca.SX.sym("ys", source.roots)
     z = complex_of(own["z_x"], own["z_y"])
     newton = complex_of(own["newton_x"], own["newton_y"])
-    before = _Estimate(z, newton, own["is_short"] != 0.0, ca.SX(0.0))
+    roots = zip(ca.vertsplit(xs), ca.vertsplit(ys), strict=True)
+    repulsion = _repulsion([z - complex_of(x, y) for x, y in roots])
+    one_and_s = complex_of(ca.if_else(own["is_short"] != 0.0, 2.0, 1.0 + _DIVISOR), ca.SX(0.0))
+    moved = symbols.estimate(z - _step(newton, repulsion, one_and_s))
 
-    all_roots = zip(ca.vertsplit(xs), ca.vertsplit(ys), strict=True)
-    step = before.step_of_all(_repulsion([z - complex_of(x, y) for x, y in all_roots]))
-    moved = symbols.estimate(z - step)
-
-    # A root is within 2 n |N| of z, n the degree (Laguerre). | |z|^2 - 1 | is about twice the distance to the circle,
-    # and where it is larger than 1, so is that.
+    # p' / p is the sum of the 2 n numbers 1 / (z - z_j), so that some root is within 2 n |N| of z, 16 |N| at most. With
+    # the distance d to the circle, min(| |z|^2 - 1 |, 1) is at most 2.42 d: where |N| is below 0.01 of it, that root is
+    # within 0.39 d. It need not be the one that this estimate goes to.
     square = _square(moved.newton)
-    height = _square(moved.z) - 1.0
-    may_be_real = square >= (_SURELY_COMPLEX / 2) ** 2 * ca.fmin(height * height, 1.0)
+    beyond = _square(moved.z) - 1.0
+    may_be_real = square >= _OFF_CIRCLE**2 * ca.fmin(beyond * beyond, 1.0)
     # False for NaN.
     moves = ca.logic_and(may_be_real, square >= _CONVERGED**2 * _square(moved.z))
     moves = ca.logic_and(moves, ca.logic_not(moved.is_rounded))
@@ -252,19 +257,26 @@ class _Symbols:
         return _Estimate.at(z, self.polynomial, self.total)
 
 
+def _step(newton: Extension, repulsion: Extension, constant: Extension) -> Extension:
+    """Return N / (c - N S), the step to subtract, with a sum S and the number c that belongs to it; else 0."""
+    return _finite(newton * (constant - newton * repulsion).inverse, _zero())
+
+
 def _repulsion(apart: list[Extension]) -> Extension:
     """Return the sum of 1 / z over complex numbers z."""
+    over_squares = _reciprocals([_square(z) for z in apart])
     sums = [_zero()] * _SUMS
-    for k, (z, over) in enumerate(zip(apart, _reciprocals(list(map(_square, apart))), strict=True)):
+    for k, (z, over) in enumerate(zip(apart, over_squares, strict=True)):
         # 1 / z = (x - i y) / |z|^2.
         sums[k % _SUMS] = sums[k % _SUMS] + complex_of(z.x * over, -z.y * over)
     return sum(sums[1:], sums[0])
 
 
 def _reciprocals(numbers: list[_SX]) -> list[_SX]:
-    """Return 1 / x of positive numbers, with one division for each eight: a division takes as long as some 16 products.
+    """Return 1 / x of positive numbers, as the product of the others of eight over that of all eight.
 
-    1 / x is the product of the seven others, over that of all.
+    Quotients with one divisor become products with one reciprocal in kernels (``Pipeline.with_reciprocals``), for a
+    division takes as long as some 16 products.
     """
     reciprocals: list[_SX] = []
     for begin in range(0, len(numbers), _TOGETHER):

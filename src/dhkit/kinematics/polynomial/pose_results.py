@@ -47,10 +47,13 @@ class PoseResults:
     q: Array
     """Joint values at the roots, shape (N, 16, 6), rad."""
     is_near: NDArray[np.bool_]
+    """Whether a root is nearly real, shape (N, 16)."""
     is_real: NDArray[np.bool_]
-    is_beside: NDArray[np.bool_]
+    """Whether it is real up to its error, shape (N, 16)."""
+    may_repeat: NDArray[np.bool_]
+    """Whether its solution may be that of another root, shape (N, 16)."""
     is_delicate: NDArray[np.bool_]
-    """Whether a root is nearly real, real, near to another, and may have a singular solution, shape (N, 16) each."""
+    """Whether its solution may be singular, or was not at the root, shape (N, 16)."""
     error: Array
     """Of the joint values, shape (N, 16), shares of the reach and rad."""
     angle: Array
@@ -109,7 +112,7 @@ class PoseResults:
             owner,
             np.arange(len(owner)),
             expected_roots(self.is_near, self.is_real, self.error_of_polynomial),
-            np.asarray(self.is_beside.any(axis=1)),
+            np.asarray(self.may_repeat.any(axis=1)),
             np.asarray(self.is_delicate.any(axis=1)),
             self.error_of_polynomial[:, 0],
         )

@@ -39,11 +39,11 @@ RESULTS = ("sorted_q", "sorted_is_outside", "sorted_details", "verdict", "error"
   one; 0 if they are not known, or T is no pose;
 - ``error``, the largest coefficient beyond the degree of the polynomial, relative to the others.
 """
-_AT_ROOT = 1e-5
+_AWAY_FROM_ROOT = 1e-5
 """Half the distance of a solution from its root, rad, above which it may be that of another root."""
 _OF_SOLUTION = ("q", "is_outside", "details", "kind")
-_BELOW_ALL = 8.0
-"""More than any number by which solutions are sorted, whose largest are near pi."""
+_KEY_OFFSET = 8.0
+"""Subtracted from keys, so that those of solutions are negative and 0 comes last."""
 
 
 def solving_steps(
@@ -137,7 +137,7 @@ def known_solutions(
     is_tried, is_real = of_root
     # Iteration from joint values that are not those of the root may lead to the solution of another root.
     away = ca.fabs(ca.sin((q[place] - inputs["angle"]) / 2.0))
-    is_delicate = ca.logic_or(is_delicate, ca.logic_not(away < _AT_ROOT))
+    is_delicate = ca.logic_or(is_delicate, ca.logic_not(away < _AWAY_FROM_ROOT))
     is_alone = ca.logic_not(ca.logic_or(is_delicate, more > 0.0))
     is_sure = ca.logic_and(ca.logic_and(is_real != 0.0, error <= CLOSES), is_alone)
     of_complex = ca.if_else(is_real != 0.0, DOUBTFUL, NONE)
@@ -148,7 +148,7 @@ def known_solutions(
     around = [ca.if_else(x < SAME_ANGLE - math.pi, x + math.tau, x) for x in some]
     order = sorting_key([ca.floor(x / SAME_ANGLE + 0.5) * SAME_ANGLE for x in around])
     # Finite even where q is NaN: the place at which a root is stored follows from it.
-    order = ca.if_else(ca.fabs(order) < _BELOW_ALL, order, 0.0)
+    order = ca.if_else(ca.fabs(order) < _KEY_OFFSET, order, 0.0)
 
     # lower <= q + 2 pi k <= upper for some whole k.
     lower = parameters[-12:-6] - LIMIT_SLACK
@@ -174,6 +174,6 @@ def known_solutions(
         "details": ca.vertcat(*details),
         "kind": kind,
         # Roots without a solution come last, with the key 0, as skipped ones have: all other keys are negative.
-        "key": ca.if_else(kind != NONE, at_tried(order) - _BELOW_ALL, 0.0),
+        "key": ca.if_else(kind != NONE, at_tried(order) - _KEY_OFFSET, 0.0),
     }
     return Graph.of("solutions", inputs, outputs)

@@ -89,7 +89,7 @@ def _angles(parameters: _SX) -> PipelineStep:
         nearest = ca.fmin(
             nearest, ca.if_else(index != float(j), square_of_distance(root, other), math.inf)
         )
-    # A root that far from the real axis has no solution that could be the same as that of its neighbour.
+    # A complex root that is not tried has no solution that could be that of its neighbour.
     nearest = ca.fmax(nearest, height * height)
     is_tried = angle < BEYOND
     # The root 1 / conj(z) is at the same angle: both lead to one solution.

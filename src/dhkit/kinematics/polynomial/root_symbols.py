@@ -28,8 +28,10 @@ _UNKNOWN = 100.0
 """Factor of the coefficients' error: where |f| is smaller, real and complex roots are not told apart. Of published arms
 with offset wrists hardly any pose has such a complex root, of arms whose wrists are almost spherical most have."""
 _MARGIN = 1e4
-"""Factor of that error, for roots that are tried."""
+"""Factor of the assumed error of the value, ``ERROR_OF_VALUE`` or that of the coefficients if it is larger, below which
+a root is tried."""
 _PARTS = 4
+"""Number of polynomials in x^4 that make one in x."""
 NEAR_ROOTS = 1e-3
 """Distance of two roots, rad, below which a solution may be singular."""
 
@@ -121,9 +123,10 @@ def value_and_slope(polynomial: list[Extension], x: Extension) -> tuple[Extensio
 
     With w = x^4 and p(x) = p_0(w) + x p_1(w) + x^2 p_2(w) + x^3 p_3(w) the slope is
 
-        p_1 + 2 x p_2 + 3 x^2 p_3 + 4 x^3 (p_0' + x p_1' + x^2 p_2' + x^3 p_3').
+        p_1 + 2 x p_2 + 3 x^2 p_3 + 4 x^3 (p_0' + x p_1' + x^2 p_2' + x^3 p_3')
 
-    The chains of sums and products are a fourth as long as Horner's for x, and the processor works on all at a time.
+    with derivatives with respect to w. Chains of sums and products are half as long as Horner's for x, and the
+    processor works on four at a time.
     """
     lowest = polynomial[::-1]
     square = x * x
@@ -134,8 +137,8 @@ def value_and_slope(polynomial: list[Extension], x: Extension) -> tuple[Extensio
     for (part, slope), power in zip(both[1:], [x, square, cube], strict=False):
         value = _product_and(value, part, power)
         inner = _product_and(inner, slope, power)
-    outer = both[1][0]
-    for k, (part, power) in enumerate(zip([x[0] for x in both[2:]], [x, square], strict=False), 2):
+    _, outer, *parts = (value_of_part for value_of_part, _ in both)
+    for k, (part, power) in enumerate(zip(parts, [x, square], strict=False), start=2):
         outer = _product_and(outer, part, power * float(k))
     return value, _product_and(outer, inner, cube * 4.0)
 

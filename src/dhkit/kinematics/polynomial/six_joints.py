@@ -110,15 +110,18 @@ class SixJoints:
         else:
             found = solve_from(self.description, self.elimination, results, poses)
         rows = np.flatnonzero(~found.is_complete)
+        known = [self.elimination]
         for way in self.ways[1 : 1 + _FURTHER_WAYS]:
             if len(rows) and way.pose_kernel.is_compiled_for(len(rows)):
                 others = solve(self.description, way.candidates, poses[rows])
-                found = _with_another_way(found, rows, others)
+                found = _with_more(found, rows, others, may_confirm=True)
                 rows = rows[~found.is_complete[rows]]
+                known.append(way)
         for way in self.ways:
             if len(rows) and isinstance(way, CompiledGeneral):
                 others = solve(self.description, way.candidates_by_lapack, poses[rows])
-                found = _with_another_way(found, rows, others)
+                # At the roots that its program found, LAPACK does not find them once more.
+                found = _with_more(found, rows, others, may_confirm=way not in known)
                 rows = rows[~found.is_complete[rows]]
         rows = rows[~found.is_confirmed[rows]]
         if len(rows):
@@ -260,8 +263,20 @@ def _with(
     )
 
 
-def _with_another_way(found: Found, rows: NDArray[np.intp], others: Found) -> Found:
-    """Return what is found, with the solutions of poses ``rows`` (M,) by another elimination added."""
+def _with_more(found: Found, rows: NDArray[np.intp], others: Found, *, may_confirm: bool) -> Found:
+    """Return what is found, with the solutions of another elimination added.
+
+    Parameters
+    ----------
+    found
+        The solutions.
+    rows
+        Indices of the poses that the other elimination solved, shape (M,).
+    others
+        What it found.
+    may_confirm
+        Whether it is not one of those that found the solutions.
+    """
     before = found.counts[rows]
     merged = _with(found, rows, others.q, others.owner, others.may_be_singular)
     # No solution is without a root, so that the smaller number of real roots counts.
@@ -272,9 +287,10 @@ def _with_another_way(found: Found, rows: NDArray[np.intp], others: Found) -> Fo
     is_known = others.is_complete & others.is_settled
     merged.expected[rows[is_known]] = others.expected[is_known]
     merged.is_exact[rows[is_known]] = True
-    # So do two ways whose roots nearly coincide, but which found the same solutions.
+    # So do two eliminations whose roots nearly coincide, but which found the same solutions.
     counts = merged.counts[rows]
-    is_same = others.is_exact & (before == counts) & (others.counts == counts)
+    is_same = (before == counts) & (others.counts == counts) & others.is_exact & may_confirm
     merged.is_settled[rows[is_known | is_same]] = True
-    merged.confirmed[rows] = np.where(is_same, found.confirmed[rows] + 1, 0)
+    confirmed = np.where(before == counts, found.confirmed[rows], 0)
+    merged.confirmed[rows] = confirmed + is_same
     return merged

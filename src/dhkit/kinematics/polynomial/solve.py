@@ -90,10 +90,10 @@ class Found:
     is_delicate: NDArray[np.bool_]
     """Whether a solution may be singular, shape (N,): two roots nearly coincide, or a solution is not at its root."""
     is_settled: NDArray[np.bool_]
-    """Whether each real root has a solution from which iteration moved it but little, or two eliminations found the
-    same solutions, shape (N,)."""
+    """Whether at least as many solutions as real roots were at their roots before iteration, or two eliminations found
+    the same solutions, shape (N,)."""
     confirmed: NDArray[np.intp]
-    """Number of eliminations that have found just the same solutions since the last new one, shape (N,)."""
+    """Number of further eliminations that have found just the same solutions since the last new one, shape (N,)."""
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:

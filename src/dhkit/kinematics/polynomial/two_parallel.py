@@ -127,8 +127,9 @@ class TwoParallel:
         also = results.more[results.is_near].astype(np.uint8)
         if not also.any():
             return found
-        # Roots that serve several combinations of signs have several solutions.
-        root, choice = np.nonzero(also[:, None] >> np.arange(len(SIGNS)) & 1)
+        # Roots that serve several combinations of signs have several solutions: bit k tells whether number k fits.
+        fits = (also[:, None] >> np.arange(len(SIGNS))) & 1
+        root, choice = np.nonzero(fits)
         more, errors = self._with_signs(
             poses[found.owner[root]], found.q[root, :1], np.array(SIGNS)[choice]
         )
