@@ -47,6 +47,9 @@ _FIRST_ANGLE = 0.4
 """Angle of the first one, rad."""
 _SHORT = 0.05
 """Share of |z| below which Newton's step counts in full, s = 1."""
+_SHORTEST = 1e-4
+"""Share of |z| up to which Newton's step counts even where the value is rounding. That moves roots of multiplicity four
+farther, but simple ones with a small slope hardly."""
 _DIVISOR = 32.0
 """The number s of longer steps."""
 _OFF_CIRCLE = 0.01
@@ -151,10 +154,12 @@ class _Estimate:
     def foreseen(self) -> Extension:
         """The number u, which is the root once the iteration has ended.
 
-        Where the value is rounding, so is Newton's step: the estimate stays.
+        Where the value is rounding, so are all but the shortest of Newton's steps: the estimate stays.
         """
+        is_longer = _square(self.newton) > _SHORTEST**2 * _square(self.z)
         share = ca.if_else(self.is_short, 1.0, 1.0 / _DIVISOR)
-        return self.z - self.newton * ca.if_else(self.is_rounded, 0.0, share)
+        stays = ca.logic_and(self.is_rounded, is_longer)
+        return self.z - self.newton * ca.if_else(stays, 0.0, share)
 
     def outputs(self, source: PolynomialSource) -> dict[str, _SX]:
         """Return the state of the iteration, as outputs of a step."""
