@@ -159,7 +159,8 @@ class _Estimate:
         is_longer = _square(self.newton) > _SHORTEST**2 * _square(self.z)
         share = ca.if_else(self.is_short, 1.0, 1.0 / _DIVISOR)
         stays = ca.logic_and(self.is_rounded, is_longer)
-        return self.z - self.newton * ca.if_else(stays, 0.0, share)
+        u: Extension = self.z - self.newton * ca.if_else(stays, 0.0, share)
+        return u
 
     def outputs(self, source: PolynomialSource) -> dict[str, _SX]:
         """Return the state of the iteration, as outputs of a step."""
