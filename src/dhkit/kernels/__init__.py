@@ -3,7 +3,6 @@
 from dhkit.kernels.batches import check_whole, fill, pose_rows, result_array
 from dhkit.kernels.elementary import EXACT_RANGE
 from dhkit.kernels.kernel import SMALL_BATCH, Kernel, kernel, kernel_mode, uncounted
-from dhkit.kernels.large_arrays import large_array
 from dhkit.kernels.single_calls import FastCall, SingleCall, never, unpacked
 from dhkit.kernels.threads import all_in_threads, in_threads
 
@@ -19,7 +18,6 @@ __all__ = [
     "in_threads",
     "kernel",
     "kernel_mode",
-    "large_array",
     "never",
     "pose_rows",
     "result_array",

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError
-from dhkit.kernels import Kernel, large_array, pose_rows
+from dhkit.kernels import Kernel, pose_rows
+from dhkit.kernels.large_arrays import large_array
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import (
     are_poses,
