@@ -156,6 +156,7 @@ class _SurePoses:
         """Return all solutions, with those of other poses in their rows (M,)."""
         B = max(1, int(self.counts.max(initial=0)), 0 if others is None else len(others.branches))
         valid = np.arange(B) < self.counts[:, None]
+        # Of 16 branches they are the program's own array, which is not copied.
         q = self.q if B == ROOTS else large_array((len(valid), B, description.n))
         flags = np.zeros(valid.shape, dtype=np.uint8)
         common = slice(min(B, ROOTS))

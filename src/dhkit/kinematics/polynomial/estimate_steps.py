@@ -144,8 +144,8 @@ class _Estimate:
         p, slope = value_and_slope(polynomial, z)
         # Where the slope is 0, any direction leads away.
         newton = _finite(p * slope.inverse, z)
-        square = _square(z)
-        is_short = _square(newton) < _SHORT**2 * square
+        square = z.norm
+        is_short = newton.norm < _SHORT**2 * square
         # |p| <= total max(1, |z|)^(2 degree), and its rounding is a share of that.
         largest = total * _power(ca.fmax(1.0, square), len(polynomial) // 2)
         return cls(z, newton, is_short, ca.fabs(p.x) + ca.fabs(p.y) <= ROUNDING * largest)
@@ -156,7 +156,7 @@ class _Estimate:
 
         Where the value is rounding, so are all but the shortest of Newton's steps: the estimate stays.
         """
-        is_longer = _square(self.newton) > _SHORTEST**2 * _square(self.z)
+        is_longer = self.newton.norm > _SHORTEST**2 * self.z.norm
         share = ca.if_else(self.is_short, 1.0, 1.0 / _DIVISOR)
         stays = ca.logic_and(self.is_rounded, is_longer)
         u: Extension = self.z - self.newton * ca.if_else(stays, 0.0, share)
@@ -220,11 +220,11 @@ def _better_estimates(parameters: _SX, source: PolynomialSource) -> PipelineStep
     # p' / p is the sum of the 2 n numbers 1 / (z - z_j), so that some root is within 2 n |N| of z, 16 |N| at most. With
     # the distance d to the circle, min(| |z|^2 - 1 |, 1) is at most 2.42 d: where |N| is below 0.01 of it, that root is
     # within 0.39 d. It need not be the one that this estimate goes to.
-    square = _square(moved.newton)
-    beyond = _square(moved.z) - 1.0
+    square = moved.newton.norm
+    beyond = moved.z.norm - 1.0
     may_be_real = square >= _OFF_CIRCLE**2 * ca.fmin(beyond * beyond, 1.0)
     # False for NaN.
-    moves = ca.logic_and(may_be_real, square >= _CONVERGED**2 * _square(moved.z))
+    moves = ca.logic_and(may_be_real, square >= _CONVERGED**2 * moved.z.norm)
     moves = ca.logic_and(moves, ca.logic_not(moved.is_rounded))
     inputs = {**symbols.inputs, **own, "xs": xs, "ys": ys}
     outputs = {**moved.outputs(source), "goes_on": ca.if_else(moves, 1.0, 0.0)}
@@ -270,7 +270,7 @@ def _step(newton: Extension, repulsion: Extension, constant: Extension) -> Exten
 
 def _repulsion(apart: list[Extension]) -> Extension:
     """Return the sum of 1 / z over complex numbers z."""
-    over_squares = _reciprocals([_square(z) for z in apart])
+    over_squares = _reciprocals([z.norm for z in apart])
     sums = [_zero()] * _SUMS
     for k, (z, over) in enumerate(zip(apart, over_squares, strict=True)):
         # 1 / z = (x - i y) / |z|^2.
@@ -308,14 +308,9 @@ def _zero() -> Extension:
     return complex_of(ca.SX(0.0), ca.SX(0.0))
 
 
-def _square(z: Extension) -> _SX:
-    """Return |z|^2."""
-    return z.x * z.x + z.y * z.y
-
-
 def _finite(z: Extension, otherwise: Extension) -> Extension:
     """Return a number z, or another one where it is none or infinite."""
-    is_finite = _square(z) < _INFINITE
+    is_finite = z.norm < _INFINITE
     x = ca.if_else(is_finite, z.x, otherwise.x)
     return complex_of(x, ca.if_else(is_finite, z.y, otherwise.y))
 

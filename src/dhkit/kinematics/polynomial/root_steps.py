@@ -13,7 +13,6 @@ from dhkit.kinematics.polynomial.estimate_steps import (
     estimate_steps,
     total_of,
 )
-from dhkit.kinematics.polynomial.extension import Extension
 from dhkit.kinematics.polynomial.root_kinds import DEGREE, NONE, ROOTS, SAMPLES
 from dhkit.kinematics.polynomial.root_symbols import (
     BEYOND,
@@ -33,7 +32,6 @@ OF_ROOT = ("angle", "is_tried", "is_real", "closeness")
 """Outputs for each root."""
 _ON_CIRCLE = 1e-6
 """Imaginary part of a root, rad, above which it is not surely real."""
-_COEFFICIENTS = 2 * DEGREE + 1
 
 
 def root_steps(parameters: _SX) -> tuple[PipelineStep, ...]:
@@ -79,16 +77,18 @@ def _known_coefficients(parameters: _SX) -> PipelineStep:
 
 def _angles(parameters: _SX) -> PipelineStep:
     """Return the step that tells which roots are real, and their angles."""
-    numbers = ca.SX.sym("numbers", _COEFFICIENTS)
+    numbers = ca.SX.sym("numbers", PolynomialSource(DEGREE).coefficients)
     error = ca.SX.sym("error")
     first = ca.SX.sym("first")
-    index, root, others = _root_and_others(ROOTS)
+    index = ca.SX.sym("index")
+    root = complex_of(ca.SX.sym("x"), ca.SX.sym("y"))
+    xs = ca.SX.sym("xs", ROOTS)
+    ys = ca.SX.sym("ys", ROOTS)
     angle, height, is_real = nearly_real(polynomial_of(numbers, DEGREE), root, error)
     nearest = ca.SX(math.inf)
-    for j, other in enumerate(others):
-        nearest = ca.fmin(
-            nearest, ca.if_else(index != float(j), square_of_distance(root, other), math.inf)
-        )
+    for j, (x, y) in enumerate(zip(ca.vertsplit(xs), ca.vertsplit(ys), strict=True)):
+        distance = square_of_distance(root, complex_of(x, y))
+        nearest = ca.fmin(nearest, ca.if_else(index != float(j), distance, math.inf))
     # A complex root that is not tried has no solution that could be that of its neighbour.
     nearest = ca.fmax(nearest, height * height)
     is_tried = angle < BEYOND
@@ -100,7 +100,11 @@ def _angles(parameters: _SX) -> PipelineStep:
         "numbers": numbers,
         "error": error,
         "first": first,
-        **_inputs_of(index, root, others),
+        "index": index,
+        "x": root.x,
+        "y": root.y,
+        "xs": xs,
+        "ys": ys,
     }
     # A root that is not tried, but perhaps real, makes its pose doubtful.
     is_idle = ca.logic_not(ca.logic_or(is_tried, is_real != 0.0))
@@ -175,23 +179,3 @@ def place_in_order(own: _SX, index: _SX, keys: _SX) -> _SX:
         is_earlier = ca.logic_and(other == own, float(j) < index)
         place = place + ca.if_else(ca.logic_or(other < own, is_earlier), 1.0, 0.0)
     return place
-
-
-def _root_and_others(count: int) -> tuple[_SX, Extension, list[Extension]]:
-    """Return symbols of a root's number, of the root, and of all roots."""
-    index = ca.SX.sym("index")
-    root = complex_of(ca.SX.sym("x"), ca.SX.sym("y"))
-    xs = ca.vertsplit(ca.SX.sym("xs", count))
-    ys = ca.vertsplit(ca.SX.sym("ys", count))
-    return index, root, [complex_of(x, y) for x, y in zip(xs, ys, strict=True)]
-
-
-def _inputs_of(index: _SX, root: Extension, others: list[Extension]) -> dict[str, _SX]:
-    """Return the symbols of :func:`_root_and_others` as inputs of a step."""
-    return {
-        "index": index,
-        "x": root.x,
-        "y": root.y,
-        "xs": ca.vertcat(*(other.x for other in others)),
-        "ys": ca.vertcat(*(other.y for other in others)),
-    }

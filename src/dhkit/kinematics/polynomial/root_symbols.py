@@ -74,7 +74,7 @@ def nearly_real(polynomial: list[Extension], root: Extension, error: SX) -> tupl
         Error of the coefficients.
     """
     tolerance = ca.fmax(ERROR_OF_VALUE, error)
-    square = root.x * root.x + root.y * root.y
+    square = root.norm
     # ln(square) / 2 of a square near 1, up to its cube.
     height = ca.fabs((square - 1.0) / (square + 1.0))
     # Between the two roots of a pair f = f'' (x^2 + height^2) / 2: that is height f' / 2, as f' is at the roots.
@@ -90,7 +90,7 @@ def nearly_real(polynomial: list[Extension], root: Extension, error: SX) -> tupl
 def _at_real_angle(polynomial: list[Extension], root: Extension) -> SX:
     """Return f = c_0 + 2 Re(c_1 w + c_2 w^2 + ...) at w = z / |z|."""
     degree = len(polynomial) // 2
-    over_radius = 1.0 / ca.sqrt(root.x * root.x + root.y * root.y)
+    over_radius = 1.0 / ca.sqrt(root.norm)
     w = complex_of(root.x * over_radius, root.y * over_radius)
     upper = polynomial[0]
     for coefficient in polynomial[1:degree]:
@@ -101,12 +101,11 @@ def _at_real_angle(polynomial: list[Extension], root: Extension) -> SX:
 def square_of_distance(root: Extension, other: Extension) -> SX:
     """Return the square of the distance of two roots near the unit circle, rad."""
     # e^(i x) - e^(i y) is as long as x - y, through pi too, and heights count like angles.
-    apart = root - other
-    return apart.x * apart.x + apart.y * apart.y
+    return (root - other).norm
 
 
 def complex_of(x: SX, y: SX) -> Extension:
-    """Return x + i y."""
+    """Return x + i y, whose ``norm`` is the square of its absolute value."""
     return Extension(x, y, _IMAGINARY_UNIT)
 
 
