@@ -95,8 +95,8 @@ class SixJoints:
         """Return the solutions of poses, with orthonormal rotations.
 
         Poses with fewer solutions than real roots, because some roots nearly coincide, are solved once more by
-        eliminating other joints, and by LAPACK, which finds two solutions at one root. Unless these agree, solutions
-        are searched for from those of poses beside them, where the roots lie apart, and then from random starts.
+        eliminating other joints, and by LAPACK, which finds two solutions at one root, then from the solutions of poses
+        beside them, where the roots lie apart, and then by iteration from random starts.
 
         Parameters
         ----------
@@ -123,7 +123,6 @@ class SixJoints:
                 # At the roots that its program found, LAPACK does not find them once more.
                 found = _with_more(found, rows, others, may_confirm=way not in known)
                 rows = rows[~found.is_complete[rows]]
-        rows = rows[~found.is_confirmed[rows]]
         if len(rows):
             found = _with(found, rows, *self._from_beside(poses[rows]))
             rows = rows[~found.is_complete[rows]]
@@ -259,7 +258,6 @@ def _with(
         is_exact=found.is_exact.copy(),
         is_delicate=is_delicate,
         is_settled=found.is_settled.copy(),
-        confirmed=found.confirmed.copy(),
     )
 
 
@@ -291,6 +289,4 @@ def _with_more(found: Found, rows: NDArray[np.intp], others: Found, *, may_confi
     counts = merged.counts[rows]
     is_same = (before == counts) & (others.counts == counts) & others.is_exact & may_confirm
     merged.is_settled[rows[is_known | is_same]] = True
-    confirmed = np.where(before == counts, found.confirmed[rows], 0)
-    merged.confirmed[rows] = confirmed + is_same
     return merged

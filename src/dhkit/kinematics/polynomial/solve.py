@@ -31,9 +31,6 @@ _NUMBERED = 3
 """Number of joints that make the number by which solutions are sorted."""
 _SPACING = 10.0
 """Distance of the numbers of two poses; those of one pose differ by up to 6."""
-_CONFIRMATIONS = 2
-"""Number of eliminations that find the same solutions, after which none are searched for: at 320 such poses, most of
-them near singularities, searches found no further regular solution."""
 MOST = 16
 """Largest number of solutions of a pose, unless they are infinitely many."""
 
@@ -92,8 +89,6 @@ class Found:
     is_settled: NDArray[np.bool_]
     """Whether at least as many solutions as real roots were at their roots before iteration, or two eliminations found
     the same solutions, shape (N,)."""
-    confirmed: NDArray[np.intp]
-    """Number of further eliminations that have found just the same solutions since the last new one, shape (N,)."""
 
     @property
     def is_complete(self) -> NDArray[np.bool_]:
@@ -108,14 +103,6 @@ class Found:
         is_counted = self.is_exact & (self.is_settled | ~self.is_delicate)
         complete: NDArray[np.bool_] = is_counted & (counts >= self.expected) & is_possible
         return complete
-
-    @property
-    def is_confirmed(self) -> NDArray[np.bool_]:
-        """Whether two more eliminations have found the same solutions of a pose, an even number, shape (N,)."""
-        counts = self.counts
-        is_possible = (counts > 0) & (counts % 2 == 0)
-        confirmed: NDArray[np.bool_] = is_possible & (self.confirmed >= _CONFIRMATIONS)
-        return confirmed
 
     @property
     def counts(self) -> NDArray[np.intp]:
@@ -169,7 +156,7 @@ def solve_parts(
     q = [np.empty((0, 6))]
     owner = [np.empty(0, dtype=np.intp)]
     may_be_singular = [np.empty(0, dtype=bool)]
-    expected, confirmed = np.zeros((2, len(poses)), dtype=np.intp)
+    expected = np.zeros(len(poses), dtype=np.intp)
     is_exact, is_delicate, is_settled = np.zeros((3, len(poses)), dtype=bool)
     for begin in range(0, len(poses), _CHUNK):
         some = slice(begin, begin + _CHUNK)
@@ -191,7 +178,6 @@ def solve_parts(
         is_exact,
         is_delicate,
         is_settled,
-        confirmed,
     )
 
 
@@ -234,7 +220,6 @@ def _closed(description: Description, found: Candidates, poses: Array) -> Found:
         is_exact,
         is_delicate,
         is_settled,
-        confirmed=np.zeros(len(poses), dtype=np.intp),
     )
 
 
